@@ -1,0 +1,210 @@
+/*
+ * libdipole: how light spreads under the surface of translucent materials.
+ *
+ * Diffusion profiles of a half-space and the numbers a renderer derives from them. Pure functions of
+ * their arguments: no globals, no allocation, no I/O; safe to call from any number of threads.
+ *
+ * Units: lengths in mm, coefficients in 1/mm. One colour channel at a time. Formulas are numbered as in
+ * docs/theory.md (T1, T2, ...).
+ */
+#ifndef DIPOLE_H
+#define DIPOLE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#define DIPOLE_VERSION_MAJOR 0
+#define DIPOLE_VERSION_MINOR 1
+#define DIPOLE_VERSION_PATCH 0
+#define DIPOLE_VERSION "0.1.0"
+
+#if defined(__GNUC__)
+#define DIPOLE_API __attribute__((visibility("default")))
+#define DIPOLE_CHECKED __attribute__((warn_unused_result))
+#define DIPOLE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define DIPOLE_API
+#define DIPOLE_CHECKED
+#define DIPOLE_PRINTF(text, first)
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- failure ------------------------------------------------------------------------------------ */
+
+typedef enum dipole_code {
+    DIPOLE_OK = 0,
+    DIPOLE_BAD_VALUE,  /* an argument or a field of a file is outside its range    */
+    DIPOLE_BAD_SYNTAX, /* a file cannot be parsed                                  */
+    DIPOLE_NOT_FOUND,  /* a file, key or device does not exist                     */
+    DIPOLE_IO_FAILED,  /* the system refused to read or write                      */
+    DIPOLE_OUT_OF_MEMORY,
+    DIPOLE_NOT_SUPPORTED, /* legal, but this build or machine cannot do it            */
+    DIPOLE_NOT_CONVERGED,
+} dipole_code;
+
+/* Why a call failed. Written on failure only; the caller owns it. */
+typedef struct dipole_status {
+    dipole_code code;
+    int line, column;  /* counted from 1; 0 when there is none     */
+    char source[128];  /* file that was read, or ""                */
+    char message[384]; /* what was found, and what was expected    */
+} dipole_status;
+
+/* A place in a file, for messages. */
+typedef struct dipole_place {
+    const char *source;
+    int line, column;
+} dipole_place;
+
+/*
+ * Fill *status (may be NULL) with code, place (may be NULL) and a printf message.
+ * Always returns false, so that a failing function can return it.
+ */
+DIPOLE_API bool dipole_fail(dipole_status *status, dipole_code code, const dipole_place *place,
+                            const char *format, ...) DIPOLE_PRINTF(4, 5);
+
+/* Version of the library that is linked: "major.minor.patch". */
+DIPOLE_API const char *dipole_version(void);
+
+/* ---- Fresnel ------------------------------------------------------------------------------------ */
+
+/* Where the diffuse Fresnel reflectance inside the surface, Fdr, comes from. */
+typedef enum dipole_fdr_kind {
+    DIPOLE_FDR_EXACT = 0,  /* 2 int F(mu) mu dmu, by quadrature; theory.md T2        */
+    DIPOLE_FDR_POLYNOMIAL, /* Egan and Hilgeman's fit, as the papers use; T3         */
+} dipole_fdr_kind;
+
+/*
+ * Unpolarised Fresnel reflectance of a smooth surface. theory.md T1.
+ *
+ *   eta      index on the far side over index on the side the light comes from, > 0
+ *   cosine   of the angle of incidence, 0 to 1
+ *   returns  0 to 1 (1 under total reflection); NaN outside the ranges
+ */
+DIPOLE_API double dipole_fresnel_reflectance(double eta, double cosine);
+
+/* Schlick's approximation to the same; for eta < 1 with the refracted cosine, so that total reflection
+ * is kept. theory.md T1. */
+DIPOLE_API double dipole_fresnel_reflectance_schlick(double eta, double cosine);
+
+/*
+ * Diffuse reflectance of the surface for light that comes from inside the medium,
+ * Fdr = 2 int_0^1 F(mu) mu dmu. theory.md T2.
+ *
+ *   eta      index inside over outside, DIPOLE_ETA_MIN to DIPOLE_ETA_MAX
+ *   returns  0 (eta = 1) to 1, relative error of both Fdr and 1 - Fdr below 1e-14; NaN outside the range
+ */
+DIPOLE_API double dipole_fdr_exact(double eta);
+
+/* 1 - Fdr of the same, without cancellation where Fdr is near 1. theory.md T2. */
+DIPOLE_API double dipole_fdt_exact(double eta);
+
+/* Egan and Hilgeman's fit of Fdr. theory.md T3. Off by up to 0.0017 for eta in 0.7 to 2.2, jumps at
+ * eta = 1, and leaves 0..1 outside about 0.27..3.8; the caller judges. NaN if eta is not > 0. */
+DIPOLE_API double dipole_fdr_polynomial(double eta);
+
+/* Diffuse transmittance of the surface for light that comes from outside, 2 int_0^1 (1 - F) mu dmu:
+ * what normalises radiance leaving by Fresnel-weighted directions. theory.md T2, T14. */
+DIPOLE_API double dipole_fdt_outside(double eta);
+
+/* ---- media -------------------------------------------------------------------------------------- */
+
+/* Legal ranges. Coefficients are 0 or in [MIN, MAX]; distances in [0, MAX]. */
+#define DIPOLE_SIGMA_MIN_PER_MM 1e-50
+#define DIPOLE_SIGMA_MAX_PER_MM 1e50
+#define DIPOLE_ETA_MIN 0.1
+#define DIPOLE_ETA_MAX 10.0
+
+/* One homogeneous medium in one colour channel. */
+typedef struct dipole_medium {
+    double sigma_a_per_mm;       /* absorption, >= 0                              */
+    double sigma_s_prime_per_mm; /* reduced scattering, >= 0; not 0 with sigma_a  */
+    double eta;                  /* index inside over outside, 0.1 to 10          */
+    dipole_fdr_kind fdr_kind;
+} dipole_medium;
+
+/* What every dipole formula needs, derived once. Read it freely; fill it by dipole_coefficients_init. */
+typedef struct dipole_coefficients {
+    double sigma_a_per_mm, sigma_s_prime_per_mm, eta; /* as given                          */
+    double sigma_t_prime_per_mm;                      /* sigma_a + sigma_s'                */
+    double alpha_prime;                               /* sigma_s' / sigma_t', 0 to 1       */
+    double mean_free_path_mm;                         /* 1 / sigma_t'                      */
+    double sigma_tr_per_mm;                           /* sqrt(3 sigma_a sigma_t')          */
+    double fdr;                                       /* internal diffuse reflectance      */
+    double boundary_a;                                /* A = (1 + Fdr) / (1 - Fdr)         */
+    double z_r_mm, z_v_mm;                            /* depth of real, height of virtual source */
+} dipole_coefficients;
+
+/*
+ * Derive what every dipole formula needs. theory.md T4.
+ * The one place where a medium is checked: fails with DIPOLE_BAD_VALUE, naming the field, its value and
+ * its range; *out is then untouched.
+ */
+DIPOLE_API DIPOLE_CHECKED bool dipole_coefficients_init(const dipole_medium *medium,
+                                                        dipole_coefficients *out, dipole_status *status);
+
+/* ---- the dipole --------------------------------------------------------------------------------- */
+
+/*
+ * Diffuse reflectance R_d(r). theory.md T5; Jensen et al. 2001.
+ *
+ *   r_mm     distance from where the light entered, >= 0
+ *   returns  power leaving per mm^2 for one unit of power entering, in 1/mm^2; >= 0 and falling with
+ *            r_mm; 0 where the true value underflows; NaN if r_mm is negative or NaN
+ */
+DIPOLE_API double dipole_rd_per_mm2(const dipole_coefficients *coefficients, double r_mm);
+
+/* Derivatives of R_d(r) with respect to log sigma_a and log sigma_s', eta held. theory.md T12.
+ * Both are finite at sigma_a = 0 and at sigma_s' = 0 (there they are 0). */
+typedef struct dipole_gradient {
+    double d_log_sigma_a, d_log_sigma_s_prime; /* in the unit of the quantity itself */
+} dipole_gradient;
+
+DIPOLE_API dipole_gradient dipole_rd_gradient(const dipole_coefficients *coefficients, double r_mm);
+
+/* The same with respect to sigma_a and sigma_s' themselves, in 1/mm; finite at sigma_a = 0, where the chain
+ * rule through log sigma_a would be 0/0. theory.md T12. */
+typedef struct dipole_derivative {
+    double d_sigma_a, d_sigma_s_prime;
+} dipole_derivative;
+
+DIPOLE_API dipole_derivative dipole_rd_derivative(const dipole_coefficients *coefficients, double r_mm);
+
+/* Total diffuse reflectance, the integral of R_d over the plane, 0 to 1. theory.md T6. */
+DIPOLE_API double dipole_diffuse_reflectance(const dipole_coefficients *coefficients);
+
+/* Its derivatives. theory.md T12. */
+DIPOLE_API dipole_gradient dipole_diffuse_reflectance_gradient(const dipole_coefficients *coefficients);
+
+/* Power leaving within r_mm of where the light entered, 0 to the total; no digits are lost at small
+ * r_mm. theory.md T7. NaN if r_mm is negative or NaN. */
+DIPOLE_API double dipole_reflectance_within(const dipole_coefficients *coefficients, double r_mm);
+
+/* Mean of R_d over the ring r_lo_mm..r_hi_mm, in 1/mm^2, without cancellation for thin rings. T7.
+ * r_lo_mm = r_hi_mm gives R_d there; NaN unless 0 <= r_lo_mm <= r_hi_mm. */
+DIPOLE_API double dipole_rd_ring_mean_per_mm2(const dipole_coefficients *coefficients, double r_lo_mm,
+                                              double r_hi_mm);
+
+/* Part of the total that leaves beyond r_mm, 1 at 0 and falling to 0; no digits are lost at large r_mm.
+ * theory.md T8. Does not depend on alpha' other than through sigma_tr, so it is defined at sigma_s' = 0. */
+DIPOLE_API double dipole_tail_fraction(const dipole_coefficients *coefficients, double r_mm);
+
+/* Radius of the disc beyond which a part epsilon (1e-100 <= epsilon < 1) of the light leaves: the root of
+ * T8, relative error below 1e-12. theory.md T9. NaN outside the range. */
+DIPOLE_API double dipole_r_max_mm(const dipole_coefficients *coefficients, double epsilon);
+
+/* Two-dimensional Fourier transform of R_d at k_per_mm (rad/mm, >= 0); the total at 0. theory.md T10. */
+DIPOLE_API double dipole_spectrum(const dipole_coefficients *coefficients, double k_per_mm);
+
+/* Spacing h of a square grid of light samples whose aliasing is at most epsilon of the
+ * total: 4 spectrum(2 pi / h) = epsilon spectrum(0). theory.md T11. epsilon 1e-100 to below 4; NaN outside.
+ * Like r_max it does not depend on alpha' otherwise, so it is defined at sigma_s' = 0. */
+DIPOLE_API double dipole_splat_spacing_mm(const dipole_coefficients *coefficients, double epsilon);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

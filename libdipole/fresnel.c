@@ -1,0 +1,137 @@
+/* Reflection at the smooth surface between medium and outside. docs/theory.md T1 to T3. */
+#include "internal.h"
+
+/* ---- one direction (T1) --------------------------------------------------------------------------- */
+
+/*
+ * With c the cosine and g = eta cos(theta_t) = sqrt(eta^2 - 1 + c^2), the textbook amplitudes
+ * (c - g)/(c + g) and (eta^2 c - g)/(eta^2 c + g) are rationalised, so that nothing cancels near eta = 1.
+ */
+double dipole_fresnel_reflectance(double eta, double cosine)
+{
+    if (!(eta > 0.0 && cosine >= 0.0 && cosine <= 1.0))
+        return NAN;
+    if (eta == 1.0)
+        return 0.0;
+    const double step = (eta - 1.0) * (eta + 1.0); /* eta^2 - 1 */
+    const double g2 = step + cosine * cosine;
+    if (g2 <= 0.0)
+        return 1.0;
+    const double g = sqrt(g2), eta2 = eta * eta;
+    const double r_s = step / square(cosine + g);
+    const double r_p = step * ((eta2 + 1.0) * cosine * cosine - 1.0) / square(eta2 * cosine + g);
+    return fmin(0.5 * (r_s * r_s + r_p * r_p), 1.0);
+}
+
+double dipole_fresnel_reflectance_schlick(double eta, double cosine)
+{
+    if (!(eta > 0.0 && cosine >= 0.0 && cosine <= 1.0))
+        return NAN;
+    double c = cosine;
+    if (eta < 1.0) {
+        const double g2 = (eta - 1.0) * (eta + 1.0) + cosine * cosine;
+        if (g2 <= 0.0)
+            return 1.0;
+        c = sqrt(g2) / eta;
+    }
+    const double f0 = square((eta - 1.0) / (eta + 1.0));
+    const double x = 1.0 - c;
+    return f0 + (1.0 - f0) * x * square(x * x);
+}
+
+/* ---- all directions (T2) -------------------------------------------------------------------------- */
+
+/* Nodes and weights of the Gauss-Legendre rule with 16 points on [-1, 1], positive half. */
+static const double legendre[8][2] = {
+    { 0.095012509837637440185, 0.18945061045506849629 }, { 0.28160355077925891323, 0.18260341504492358887 },
+    { 0.45801677765722738634, 0.16915651939500253819 },  { 0.61787624440264374845, 0.14959598881657673208 },
+    { 0.7554044083550030339, 0.12462897125553387205 },   { 0.86563120238783174388, 0.09515851168249278481 },
+    { 0.94457502307323257608, 0.062253523938647892863 }, { 0.9894009349916499326, 0.027152459411754094852 },
+};
+
+struct moments {
+    double reflected, transmitted; /* 2 int F mu dmu and 2 int (1 - F) mu dmu; their sum is 1 */
+};
+
+/*
+ * Both moments for light going from the thin side to the dense side, x >= 1 their index ratio.
+ *
+ * With s = -r_s, the amplitude of s-polarised light, the cosine obeys mu^2 = (x^2 - 1)(1 - s)^2/(4 s) and
+ * everything is rational in s from s_0 = (x - 1)/(x + 1) at normal incidence to 1 at grazing. In v = -log s
+ * the integrands are smooth on the scale of 1 and their nearest pole lies 2/(x^2 - 1) beyond v = 0, so
+ * panels no longer than 1 and at least four of them bring 16 points to rounding for x up to 10.
+ * step = x^2 - 1 and s_0 come from the caller, who knows them without cancellation.
+ */
+static struct moments moments_thin_to_dense(double step, double s_0)
+{
+    const double x2 = 1.0 + step, length = -log(s_0);
+    const int panel_count = (int)fmax(4.0, ceil(length));
+    const double half = 0.5 * length / panel_count;
+    struct moments sum = { 0.0, 0.0 };
+    for (int panel = 0; panel < panel_count; panel++) {
+        const double middle = (2 * panel + 1) * half;
+        for (int node = 0; node < 16; node++) {
+            const double *const rule = legendre[node / 2];
+            const double v = middle + (node % 2 == 0 ? half : -half) * rule[0];
+            const double s = exp(-v), denominator = (x2 + 1.0) - s * step;
+            const double r_p = (step - s * (x2 + 1.0)) / denominator;
+            const double one_minus_s2 = -expm1(-2.0 * v);
+            const double reflected = 0.5 * (s * s + r_p * r_p);
+            const double transmitted = 0.5 * one_minus_s2 * (1.0 + 4.0 * x2 / square(denominator));
+            /* 2 mu dmu = (x^2 - 1)/4 (1/s^2 - 1) ds, and ds = s dv */
+            const double weight = rule[1] * half * 0.25 * step * one_minus_s2 / s;
+            sum.reflected += weight * reflected;
+            sum.transmitted += weight * transmitted;
+        }
+    }
+    return sum;
+}
+
+static bool eta_is_legal(double eta)
+{
+    return eta >= DIPOLE_ETA_MIN && eta <= DIPOLE_ETA_MAX;
+}
+
+/* The moments for light from inside. From the dense side they follow from the other side's by
+ * reciprocity: eta^2 (1 - F_inside) = 1 - F_outside, the rest is total reflection. */
+static struct moments moments_inside(double eta)
+{
+    if (!eta_is_legal(eta))
+        return (struct moments){ NAN, NAN };
+    if (eta == 1.0)
+        return (struct moments){ 0.0, 1.0 };
+    const double eta2 = eta * eta;
+    if (eta > 1.0) {
+        const double step = (eta - 1.0) * (eta + 1.0);
+        const struct moments outside = moments_thin_to_dense(step, (eta - 1.0) / (eta + 1.0));
+        return (struct moments){ (step + outside.reflected) / eta2, outside.transmitted / eta2 };
+    }
+    return moments_thin_to_dense((1.0 - eta) * (1.0 + eta) / eta2, (1.0 - eta) / (1.0 + eta));
+}
+
+double dipole_fdr_exact(double eta)
+{
+    return moments_inside(eta).reflected;
+}
+
+double dipole_fdt_exact(double eta)
+{
+    return moments_inside(eta).transmitted;
+}
+
+double dipole_fdt_outside(double eta)
+{
+    return eta * eta * moments_inside(eta).transmitted;
+}
+
+/* ---- the fit (T3) --------------------------------------------------------------------------------- */
+
+double dipole_fdr_polynomial(double eta)
+{
+    if (!(eta > 0.0))
+        return NAN;
+    const double x = 1.0 / eta;
+    if (eta >= 1.0)
+        return -1.440 * x * x + 0.710 * x + 0.668 + 0.0636 * eta;
+    return -0.4399 + 0.7099 * x - 0.3319 * x * x + 0.0636 * x * x * x;
+}
