@@ -1,0 +1,201 @@
+/* OpenImageIO behind a C header. Its exceptions end here. */
+#include "io/image.h"
+
+#include "io/file.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <vector>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <zlib.h>
+
+namespace
+{
+
+constexpr size_t FILE_LIMIT_BYTES = size_t{ 1 } << 32;
+
+/* IEC 61966-2-1. */
+double srgb_from_linear(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
+}
+
+double linear_from_srgb(double srgb)
+{
+    return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
+}
+
+/* 0..1 to 0..255; NaN is black. */
+unsigned char byte_from_unit(double value)
+{
+    const double clamped = value > 0.0 ? std::fmin(value, 1.0) : 0.0;
+    return static_cast<unsigned char>(std::floor(clamped * 255.0 + 0.5));
+}
+
+std::vector<unsigned char> encode(const io_image &image)
+{
+    const size_t channels = static_cast<size_t>(image.channel_count);
+    const size_t count = static_cast<size_t>(image.width_px) * static_cast<size_t>(image.height_px);
+    const size_t colours = channels == 4 ? 3 : channels;
+    std::vector<unsigned char> bytes(count * channels);
+    for (size_t i = 0; i < count; i++) {
+        const float *in = image.pixels + i * channels;
+        unsigned char *out = bytes.data() + i * channels;
+        const double alpha = channels == 4 ? std::fmin(std::fmax(in[3], 0.0), 1.0) : 1.0;
+        for (size_t c = 0; c < colours; c++) {
+            const double linear = alpha > 0.0 ? in[c] / alpha : 0.0;
+            out[c] = byte_from_unit(srgb_from_linear(linear));
+        }
+        if (channels == 4)
+            out[3] = byte_from_unit(alpha);
+    }
+    return bytes;
+}
+
+bool write_png(const char *path, const io_image &image, dipole_status *status)
+{
+    const dipole_place place = { path, 0, 0 };
+    const std::vector<unsigned char> bytes = encode(image);
+    std::vector<unsigned char> file;
+    OIIO::Filesystem::IOVecOutput stream(file);
+    OIIO::ImageSpec spec(image.width_px, image.height_px, image.channel_count, OIIO::TypeDesc::UINT8);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
+    if (!output)
+        return dipole_fail(status, DIPOLE_NOT_SUPPORTED, &place, "cannot be written: %s",
+                           OIIO::geterror().c_str());
+    if (!output->set_ioproxy(&stream) || !output->open("png", spec) ||
+        !output->write_image(OIIO::TypeDesc::UINT8, bytes.data()) || !output->close())
+        return dipole_fail(status, DIPOLE_IO_FAILED, &place, "cannot be written as PNG: %s",
+                           output->geterror().c_str());
+    return io_file_write(path, file.data(), file.size(), status);
+}
+
+/* Integers are sRGB with alpha beside the colour; what is in memory is linear and premultiplied. */
+void decode(io_image &image, bool is_srgb, bool is_unassociated)
+{
+    const size_t channels = static_cast<size_t>(image.channel_count);
+    const size_t count = static_cast<size_t>(image.width_px) * static_cast<size_t>(image.height_px);
+    const size_t colours = channels == 4 ? 3 : channels;
+    for (size_t i = 0; i < count; i++) {
+        float *pixel = image.pixels + i * channels;
+        for (size_t c = 0; c < colours; c++) {
+            double value = is_srgb ? linear_from_srgb(pixel[c]) : pixel[c];
+            if (is_unassociated && channels == 4)
+                value *= pixel[3];
+            pixel[c] = static_cast<float>(value);
+        }
+    }
+}
+
+unsigned long big_endian(const char *data)
+{
+    unsigned long value = 0;
+    for (int i = 0; i < 4; i++)
+        value = value << 8 | static_cast<unsigned char>(data[i]);
+    return value;
+}
+
+/* Where a PNG is damaged or ends too early; 0 when it is whole, or no PNG. */
+size_t png_damage(const char *data, size_t size)
+{
+    static const char signature[] = "\x89PNG\r\n\x1a\n";
+    if (size < 8 || std::memcmp(data, signature, 8) != 0)
+        return 0;
+    size_t at = 8;
+    while (size - at >= 12) { /* length, name, content, checksum of name and content */
+        const unsigned long length = big_endian(data + at);
+        if (length > size - at - 12)
+            break;
+        const unsigned long checksum =
+            crc32(0, reinterpret_cast<const Bytef *>(data + at + 4), static_cast<uInt>(length + 4));
+        if (checksum != big_endian(data + at + 8 + length))
+            break;
+        if (std::memcmp(data + at + 4, "IEND", 4) == 0)
+            return 0;
+        at += 12 + length;
+    }
+    return at;
+}
+
+/* Fail unless the file can be read. libpng prints what it thinks of a damaged file, so damage is found
+ * first. */
+bool check_file(const char *path, dipole_status *status)
+{
+    char *data = nullptr;
+    size_t size = 0;
+    if (!io_file_read(path, FILE_LIMIT_BYTES, &data, &size, status))
+        return false;
+    const size_t damage = png_damage(data, size);
+    std::free(data);
+    const dipole_place place = { path, 0, 0 };
+    return damage == 0 ||
+           dipole_fail(status, DIPOLE_BAD_SYNTAX, &place,
+                       "cannot be read as an image: the PNG is damaged or cut at byte %zu of %zu", damage,
+                       size);
+}
+
+bool read_photo(const char *path, io_image **image_out, dipole_status *status)
+{
+    const dipole_place place = { path, 0, 0 };
+    if (!check_file(path, status))
+        return false;
+    OIIO::ImageSpec hints;
+    hints.attribute("oiio:UnassociatedAlpha", 1); /* else alpha is multiplied in before sRGB is undone */
+    const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &hints);
+    if (!input)
+        return dipole_fail(status, DIPOLE_BAD_SYNTAX, &place, "cannot be read as an image: %s",
+                           OIIO::geterror().c_str());
+    const OIIO::ImageSpec &spec = input->spec();
+    if (spec.deep || spec.depth > 1)
+        return dipole_fail(status, DIPOLE_NOT_SUPPORTED, &place,
+                           "is deep or a volume, expected a flat image");
+    const int channels = spec.nchannels < 3 ? 1 : spec.nchannels == 3 ? 3 : 4;
+    const bool is_srgb = !spec.format.is_floating_point();
+    const bool is_unassociated = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0;
+    io_image *image = nullptr;
+    if (!io_image_create(spec.width, spec.height, channels, &image, status))
+        return false;
+    std::unique_ptr<io_image, void (*)(io_image *)> owner(image, io_image_destroy);
+    if (!input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, image->pixels))
+        return dipole_fail(status, DIPOLE_BAD_SYNTAX, &place, "cannot be read as an image: %s",
+                           input->geterror().c_str());
+    decode(*image, is_srgb, is_unassociated);
+    *image_out = owner.release();
+    return true;
+}
+
+/* Run work; what it throws becomes a status. */
+template <typename Work> bool guarded(const char *path, dipole_status *status, Work work)
+{
+    const dipole_place place = { path, 0, 0 };
+    try {
+        return work();
+    } catch (const std::bad_alloc &) {
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, &place, "no memory for this image");
+    } catch (const std::exception &problem) {
+        return dipole_fail(status, DIPOLE_IO_FAILED, &place, "OpenImageIO failed: %s", problem.what());
+    } catch (...) {
+        return dipole_fail(status, DIPOLE_IO_FAILED, &place, "OpenImageIO failed, expected it to say why");
+    }
+}
+
+} // namespace
+
+bool io_png_write(const char *path, const io_image *image, dipole_status *status)
+{
+    return guarded(path, status, [&] { return write_png(path, *image, status); });
+}
+
+bool io_photo_read(const char *path, io_image **image_out, dipole_status *status)
+{
+    *image_out = nullptr;
+    return guarded(path, status, [&] { return read_photo(path, image_out, status); });
+}

@@ -1,0 +1,31 @@
+/* Material files; docs/formats.md and materials/material.schema.json describe them. */
+#ifndef IO_MATERIAL_FILE_H
+#define IO_MATERIAL_FILE_H
+
+#include "io/json.h"
+#include "libdipole/dipole.h"
+
+enum { IO_CHANNEL_COUNT = 3 };
+
+/* Names of the channels: "R", "G", "B". */
+extern const char *const io_channel_names[IO_CHANNEL_COUNT];
+
+struct io_material {
+    char name[128];
+    char source[512];                       /* publication, or ""                        */
+    char warning[384];                      /* suspicious but legal (a unit slip), or "" */
+    dipole_medium medium[IO_CHANNEL_COUNT]; /* checked by dipole_coefficients_init       */
+};
+
+/* Read and check a material file. Fails with place (line, column where JSON has them) and the key. */
+DIPOLE_CHECKED bool io_material_read(const char *path, struct io_material *out, dipole_status *status);
+
+/* The same from a value of a parsed file, a material that stands inside a scene. */
+DIPOLE_CHECKED bool io_material_parse(const struct io_json *at, struct io_material *out,
+                                      dipole_status *status);
+
+/* Write a material file; fit (may be NULL) becomes its "fit" block. */
+DIPOLE_CHECKED bool io_material_write(const char *path, const struct io_material *material,
+                                      const json_t *fit, dipole_status *status);
+
+#endif
