@@ -19,22 +19,6 @@ static bool has_suffix(const char *text, const char *suffix)
     return length > suffix_length && strcmp(text + length - suffix_length, suffix) == 0;
 }
 
-/* A file of that name, else the bundled material: "marble" is materials/marble.json. */
-static bool read_material(const char *name, struct io_material *out, dipole_status *status)
-{
-    char relative[4096], path[4096];
-    dipole_status why = { 0 };
-    if (io_material_read(name, out, &why))
-        return true;
-    const int size = snprintf(relative, sizeof relative, "materials/%s.json", name);
-    if (why.code == DIPOLE_NOT_FOUND && !strstr(name, "..") && size > 0 && (size_t)size < sizeof relative &&
-        io_data_path(relative, path, sizeof path, NULL))
-        return io_material_read(path, out, status);
-    if (status)
-        *status = why;
-    return false;
-}
-
 static bool write_plot(const struct inspector_result *result, const char *path, dipole_status *status)
 {
     void *data = NULL;
@@ -68,7 +52,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     result->epsilon = options->epsilon;
     result->radius_count = options->at_mm.count;
     memcpy(result->radii_mm, options->at_mm.values, sizeof result->radii_mm);
-    bool is_done = read_material(material, &result->material, status);
+    bool is_done = io_material_open(material, &result->material, status);
     if (is_done && result->material.warning[0])
         cli_note(tool, &options->common, "%s: %s", material, result->material.warning);
     is_done = is_done && inspector_result_derive(result, status) &&

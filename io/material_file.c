@@ -189,6 +189,40 @@ bool io_material_read(const char *path, struct io_material *out, dipole_status *
     return done;
 }
 
+/* ---- bundled materials ---------------------------------------------------------------------------- */
+
+bool io_material_is_bundled_name(const char *text)
+{
+    static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+    const size_t first = strspn(text, letters);
+    if (first == 0 || text[first] == '\0')
+        return first > 0;
+    const size_t second = text[first] == '/' ? strspn(text + first + 1, letters) : 0;
+    return second > 0 && text[first + 1 + second] == '\0';
+}
+
+bool io_material_bundled_path(const char *name, char *out, size_t size, dipole_status *status)
+{
+    char relative[256];
+    const int length = snprintf(relative, sizeof relative, "materials/%s.json", name);
+    if (!io_material_is_bundled_name(name) || length >= (int)sizeof relative)
+        return dipole_fail(status, DIPOLE_NOT_FOUND, NULL, "no bundled material is named %.60s", name);
+    return io_data_path(relative, out, size, status);
+}
+
+bool io_material_open(const char *name, struct io_material *out, dipole_status *status)
+{
+    char path[4096];
+    dipole_status why = { 0 };
+    if (io_material_read(name, out, &why))
+        return true;
+    if (why.code == DIPOLE_NOT_FOUND && io_material_bundled_path(name, path, sizeof path, NULL))
+        return io_material_read(path, out, status);
+    if (status)
+        *status = why;
+    return false;
+}
+
 /* ---- writing -------------------------------------------------------------------------------------- */
 
 bool io_material_write(const char *path, const struct io_material *material, const json_t *fit,

@@ -20,6 +20,15 @@ struct io_material {
 /* Read and check a material file. Fails with place (line, column where JSON has them) and the key. */
 DIPOLE_CHECKED bool io_material_read(const char *path, struct io_material *out, dipole_status *status);
 
+/* A name without ".json" such as "marble" or "narasimhan2006/espresso", and where the bundled material of
+ * that name is. Fails with DIPOLE_NOT_FOUND. */
+bool io_material_is_bundled_name(const char *text);
+DIPOLE_CHECKED bool io_material_bundled_path(const char *name, char *out, size_t size,
+                                             dipole_status *status);
+
+/* What a user names on a command line: a file, or where there is none of that name a bundled material. */
+DIPOLE_CHECKED bool io_material_open(const char *name, struct io_material *out, dipole_status *status);
+
 /* The same from a value of a parsed file, a material that stands inside a scene. */
 DIPOLE_CHECKED bool io_material_parse(const struct io_json *at, struct io_material *out,
                                       dipole_status *status);

@@ -347,24 +347,12 @@ static bool read_shape(const struct io_json *object, const struct io_scene_optio
     return file.value ? read_mesh(&file, options, mesh, status) : create_primitive(object, mesh, status);
 }
 
-/* "marble" and "narasimhan2006/espresso" are bundled; "marble.json" and "./marble" are paths. */
-static bool is_bundled_name(const char *text)
-{
-    static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
-    const size_t first = strspn(text, letters);
-    if (first == 0 || text[first] == '\0')
-        return first > 0;
-    const size_t second = text[first] == '/' ? strspn(text + first + 1, letters) : 0;
-    return second > 0 && text[first + 1 + second] == '\0';
-}
-
 static bool read_bundled_material(const struct io_json *at, struct io_material *material,
                                   dipole_status *status)
 {
-    char relative[256], path[PATH_MAX];
+    char path[PATH_MAX];
     const char *name = json_string_value(at->value);
-    const int length = snprintf(relative, sizeof relative, "materials/%s.json", name);
-    if (length >= (int)sizeof relative || !io_data_path(relative, path, sizeof path, NULL))
+    if (!io_material_bundled_path(name, path, sizeof path, NULL))
         return io_json_fail(
             at, DIPOLE_NOT_FOUND, status,
             "is \"%.60s\", which is no bundled material, expected one such as \"marble\", a path "
@@ -380,7 +368,7 @@ static bool read_material(const struct io_json *at, const struct io_scene_option
     const char *text = json_string_value(at->value);
     if (!text)
         return io_material_parse(at, material, status);
-    if (is_bundled_name(text))
+    if (io_material_is_bundled_name(text))
         return read_bundled_material(at, material, status);
     return resolve(at, options, path, status) && io_material_read(path, material, status);
 }
