@@ -350,7 +350,7 @@ bool io_json_get_integer(const struct io_json *object, const char *key, int min,
                          dipole_status *status)
 {
     const struct io_json member = io_json_member(object, key);
-    double value;
+    double value = 0.0;
     if (!member.value)
         return true;
     if (!get_number(&member, min, max, "a whole number", &value, status))

@@ -8,24 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/*
- * fontconfig keeps what it read until the process ends. The leak checker, when it is linked, asks for these
- * two functions by name; nothing else calls them.
- */
-#define SANITIZER_HOOK __attribute__((visibility("default"))) const char *
-/* NOLINTBEGIN(bugprone-reserved-identifier) */
-SANITIZER_HOOK __lsan_default_suppressions(void);
-SANITIZER_HOOK __lsan_default_options(void);
-SANITIZER_HOOK __lsan_default_suppressions(void)
-{
-    return "leak:libfontconfig\n";
-}
-SANITIZER_HOOK __lsan_default_options(void)
-{
-    return "print_suppressions=0";
-}
-/* NOLINTEND(bugprone-reserved-identifier) */
-
 /* More pixels than any figure has; less than would exhaust a small machine. */
 static const double side_limit_px = 16384;
 

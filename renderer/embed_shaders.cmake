@@ -1,0 +1,15 @@
+# Write the shader files of FOLDER into one C file OUTPUT, as bytes: cmake -DFOLDER= -DOUTPUT= -P this
+file(GLOB_RECURSE paths RELATIVE ${FOLDER} ${FOLDER}/*.vert ${FOLDER}/*.frag ${FOLDER}/*.glsl)
+list(SORT paths)
+set(arrays "")
+set(rows "")
+set(index 0)
+foreach(path IN LISTS paths)
+  file(READ ${FOLDER}/${path} bytes HEX)
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")
+  string(APPEND arrays "static const char text_${index}[] = { ${bytes}0 };\n")
+  string(APPEND rows "    { \"${path}\", text_${index} },\n")
+  math(EXPR index "${index} + 1")
+endforeach()
+file(WRITE ${OUTPUT} "#include \"renderer/gl.h\"\n\n${arrays}\n"
+  "const struct render_shader render_shaders[] = {\n${rows}    { 0, 0 },\n};\n")

@@ -1,0 +1,293 @@
+#include "renderer/light_samples.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+/* Extents are measured on float positions: a patch exactly as wide as the spacing must not be split. */
+#define EXTENT_SLACK 1e-4
+
+enum { FIRST_CAPACITY = 4096 };
+
+/* A block of texels. */
+struct block {
+    int x, y, width, height;
+};
+
+struct reducer {
+    struct render_light_samples *samples;
+    const struct render_light_view *view;
+    double limit_mm;
+    dipole_status *status;
+};
+
+static const float *texel(const struct render_light_view *view, int x, int y)
+{
+    return view->texels + 4 * ((size_t)y * (size_t)view->size_px + (size_t)x);
+}
+
+/*
+ * Extent on the surface of one line of texels, from (x, y) in steps of (dx, dy): across the view from end
+ * to end, and in depth from nearest to farthest. Positions are those of texel centres, so the extent is
+ * scaled from the distance of centres to whole texels.
+ */
+static double line_extent_mm(const struct render_light_view *view, int x, int y, int dx, int dy, int count)
+{
+    const float *first = NULL, *last = NULL;
+    int first_index = 0, last_index = 0;
+    double depth_min = INFINITY, depth_max = -INFINITY;
+    for (int i = 0; i < count; i++) {
+        const float *const t = texel(view, x + i * dx, y + i * dy);
+        if (!(t[3] > 0))
+            continue;
+        const double depth = view->forward[0] * (double)t[0] + view->forward[1] * (double)t[1] +
+                             view->forward[2] * (double)t[2];
+        depth_min = fmin(depth_min, depth);
+        depth_max = fmax(depth_max, depth);
+        if (!first) {
+            first = t;
+            first_index = i;
+        }
+        last = t;
+        last_index = i;
+    }
+    if (first_index == last_index)
+        return 0;
+    double step[3], along = 0;
+    for (int k = 0; k < 3; k++) {
+        step[k] = (double)last[k] - (double)first[k];
+        along += step[k] * view->forward[k];
+    }
+    double across2 = 0;
+    for (int k = 0; k < 3; k++)
+        across2 += (step[k] - along * view->forward[k]) * (step[k] - along * view->forward[k]);
+    const double depth_range = depth_max - depth_min;
+    const int steps = last_index - first_index;
+    return sqrt(across2 + depth_range * depth_range) * (steps + 1) / steps;
+}
+
+/* Largest extent of a block's lines along x (or y). A block one texel wide is measured together with its
+ * neighbour, of which it is half. */
+static double block_extent_mm(const struct render_light_view *view, struct block block, bool is_along_x)
+{
+    const int length = is_along_x ? block.width : block.height;
+    if (length == 1) {
+        if (is_along_x) {
+            block.x &= ~1;
+            block.width = block.x + 2 <= view->size_px ? 2 : 1;
+        } else {
+            block.y &= ~1;
+            block.height = block.y + 2 <= view->size_px ? 2 : 1;
+        }
+    }
+    double largest = 0;
+    const int lines = is_along_x ? block.height : block.width;
+    for (int i = 0; i < lines; i++) {
+        const double extent = is_along_x ? line_extent_mm(view, block.x, block.y + i, 1, 0, block.width)
+                                         : line_extent_mm(view, block.x + i, block.y, 0, 1, block.height);
+        largest = fmax(largest, extent);
+    }
+    return length == 1 ? 0.5 * largest : largest;
+}
+
+static bool append(struct render_light_samples *samples, const struct render_light_sample *sample,
+                   dipole_status *status)
+{
+    if (samples->count == samples->capacity) {
+        const size_t capacity = samples->capacity ? 2 * samples->capacity : FIRST_CAPACITY;
+        struct render_light_sample *const grown = capacity > SIZE_MAX / sizeof *grown
+                                                      ? NULL
+                                                      : realloc(samples->samples, capacity * sizeof *grown);
+        if (!grown)
+            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
+                               capacity);
+        samples->samples = grown;
+        samples->capacity = capacity;
+    }
+    samples->samples[samples->count++] = *sample;
+    return true;
+}
+
+static bool append_block(const struct reducer *reducer, struct block block, double extent_mm)
+{
+    const struct render_light_view *const view = reducer->view;
+    double share = 0, moment[3] = { 0, 0, 0 };
+    for (int y = block.y; y < block.y + block.height; y++) {
+        for (int x = block.x; x < block.x + block.width; x++) {
+            const float *const t = texel(view, x, y);
+            if (!(t[3] > 0))
+                continue;
+            share += (double)t[3];
+            for (int k = 0; k < 3; k++)
+                moment[k] += (double)t[3] * (double)t[k];
+        }
+    }
+    if (!(share > 0))
+        return true;
+    struct render_light_sample sample = { .footprint_mm = (float)extent_mm };
+    for (int k = 0; k < 3; k++) {
+        sample.position_mm[k] = (float)(moment[k] / share);
+        sample.flux_w[k] = (float)(share * view->rgb[k]);
+    }
+    return append(reducer->samples, &sample, reducer->status);
+}
+
+/* Halve the block across its longer side on the surface until both are short enough. */
+static bool reduce_block(const struct reducer *reducer, struct block block)
+{
+    const double extent_x_mm = block_extent_mm(reducer->view, block, true);
+    const double extent_y_mm = block_extent_mm(reducer->view, block, false);
+    const bool can_split_x = block.width > 1 && extent_x_mm > reducer->limit_mm;
+    const bool can_split_y = block.height > 1 && extent_y_mm > reducer->limit_mm;
+    if (!can_split_x && !can_split_y)
+        return append_block(reducer, block, fmax(extent_x_mm, extent_y_mm));
+    struct block low = block, high = block;
+    if (can_split_x && (extent_x_mm >= extent_y_mm || !can_split_y)) {
+        low.width /= 2;
+        high.x += low.width;
+        high.width -= low.width;
+    } else {
+        low.height /= 2;
+        high.y += low.height;
+        high.height -= low.height;
+    }
+    return reduce_block(reducer, low) && reduce_block(reducer, high);
+}
+
+/* Walk down the quadtree over the whole view: samples near in space then lie near in the list. */
+static bool reduce_quadrant(const struct reducer *reducer, int x, int y, int size)
+{
+    const int size_px = reducer->view->size_px;
+    if (x >= size_px || y >= size_px)
+        return true;
+    if (size <= 1 << reducer->view->levels)
+        return reduce_block(reducer, (struct block){ .x = x,
+                                                     .y = y,
+                                                     .width = size < size_px - x ? size : size_px - x,
+                                                     .height = size < size_px - y ? size : size_px - y });
+    const int half = size / 2;
+    return reduce_quadrant(reducer, x, y, half) && reduce_quadrant(reducer, x + half, y, half) &&
+           reduce_quadrant(reducer, x, y + half, half) &&
+           reduce_quadrant(reducer, x + half, y + half, half);
+}
+
+bool render_light_samples_append(struct render_light_samples *samples, const struct render_light_view *view,
+                                 double spacing_mm, dipole_status *status)
+{
+    const struct reducer reducer = {
+        .samples = samples, .view = view, .limit_mm = spacing_mm * (1 + EXTENT_SLACK), .status = status
+    };
+    int size = 1;
+    while (size < view->size_px)
+        size *= 2;
+    return reduce_quadrant(&reducer, 0, 0, size);
+}
+
+/* ---- merging ------------------------------------------------------------------------------------ */
+
+/* A sample's cube, as its place on the Z-order curve. */
+struct key {
+    uint64_t code;
+    size_t index;
+};
+
+/* Put two zeros between the low 21 bits. */
+static uint64_t spread_bits(uint64_t x)
+{
+    x &= 0x1fffff;
+    x = (x | x << 32) & 0x001f00000000ffff;
+    x = (x | x << 16) & 0x001f0000ff0000ff;
+    x = (x | x << 8) & 0x100f00f00f00f00f;
+    x = (x | x << 4) & 0x10c30c30c30c30c3;
+    return (x | x << 2) & 0x1249249249249249;
+}
+
+static uint64_t cube_code(const struct render_light_sample *sample, const double min_mm[3], double cell_mm)
+{
+    uint64_t code = 0;
+    for (int k = 0; k < 3; k++) {
+        const double cell = floor(((double)sample->position_mm[k] - min_mm[k]) / cell_mm);
+        code |= spread_bits((uint64_t)fmin(cell, 0x1fffff)) << k;
+    }
+    return code;
+}
+
+/* By code, then by index: the same order everywhere. */
+static int compare_keys(const void *a, const void *b)
+{
+    const struct key *const x = a, *const y = b;
+    if (x->code != y->code)
+        return x->code < y->code ? -1 : 1;
+    return x->index < y->index ? -1 : x->index > y->index;
+}
+
+/* Brightness, whatever the colour: what a mean position is weighted by. */
+static double weight_of(const struct render_light_sample *sample)
+{
+    return (double)sample->flux_w[0] + (double)sample->flux_w[1] + (double)sample->flux_w[2];
+}
+
+static struct render_light_sample merge_run(const struct render_light_samples *samples,
+                                            const struct key *keys, size_t count)
+{
+    double flux_w[3] = { 0, 0, 0 }, moment[3] = { 0, 0, 0 }, weight_sum = 0, diagonal2 = 0;
+    float min[3], max[3], footprint_mm = 0;
+    for (int k = 0; k < 3; k++)
+        min[k] = max[k] = samples->samples[keys[0].index].position_mm[k];
+    for (size_t i = 0; i < count; i++) {
+        const struct render_light_sample *const sample = &samples->samples[keys[i].index];
+        const double weight = weight_of(sample);
+        weight_sum += weight;
+        footprint_mm = fmaxf(footprint_mm, sample->footprint_mm);
+        for (int k = 0; k < 3; k++) {
+            flux_w[k] += (double)sample->flux_w[k];
+            moment[k] += weight * (double)sample->position_mm[k];
+            min[k] = fminf(min[k], sample->position_mm[k]);
+            max[k] = fmaxf(max[k], sample->position_mm[k]);
+        }
+    }
+    struct render_light_sample merged = { .reserved = 0 };
+    for (int k = 0; k < 3; k++) {
+        merged.position_mm[k] = (float)(moment[k] / weight_sum);
+        merged.flux_w[k] = (float)flux_w[k];
+        diagonal2 += (double)(max[k] - min[k]) * (double)(max[k] - min[k]);
+    }
+    merged.footprint_mm = (float)sqrt(diagonal2) + footprint_mm;
+    return merged;
+}
+
+bool render_light_samples_merge(const struct render_light_samples *samples, double cell_mm,
+                                struct render_light_samples *merged, dipole_status *status)
+{
+    const size_t count = samples->count;
+    if (count == 0)
+        return true;
+    struct key *const keys = malloc(count * sizeof *keys);
+    if (!keys)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to merge %zu light samples",
+                           count);
+    double min_mm[3] = { INFINITY, INFINITY, INFINITY };
+    for (size_t i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++)
+            min_mm[k] = fmin(min_mm[k], (double)samples->samples[i].position_mm[k]);
+    }
+    for (size_t i = 0; i < count; i++)
+        keys[i] = (struct key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm), .index = i };
+    qsort(keys, count, sizeof *keys, compare_keys);
+    bool done = true;
+    for (size_t first = 0, end; done && first < count; first = end) {
+        end = first + 1;
+        while (end < count && keys[end].code == keys[first].code)
+            end++;
+        const struct render_light_sample sample = merge_run(samples, keys + first, end - first);
+        done = append(merged, &sample, status);
+    }
+    free(keys);
+    return done;
+}
+
+void render_light_samples_destroy(struct render_light_samples *samples)
+{
+    free(samples->samples);
+    *samples = (struct render_light_samples){ 0 };
+}

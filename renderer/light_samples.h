@@ -1,0 +1,52 @@
+/*
+ * Where light enters: a picture taken from a light, reduced to samples no farther apart on the surface
+ * than the spacing asked. Pure C on plain arrays: no OpenGL here. theory.md T13.
+ */
+#ifndef RENDERER_LIGHT_SAMPLES_H
+#define RENDERER_LIGHT_SAMPLES_H
+
+#include "libdipole/dipole.h"
+
+/* Light that enters through one patch of surface. */
+struct render_light_sample {
+    float position_mm[3]; /* flux-weighted mean of the patch          */
+    float footprint_mm;   /* largest extent of the patch              */
+    float flux_w[3];      /* transmitted power per channel, in W      */
+    float reserved;       /* keeps rows 16-byte aligned for the GPU   */
+};
+
+struct render_light_samples {
+    struct render_light_sample *samples;
+    size_t count, capacity;
+};
+
+/* One picture from a light: size_px x size_px texels of { x, y, z in mm, power share }, where
+ * power share times the light's rgb is the transmitted power in W of the texel; 0 where no surface is. */
+struct render_light_view {
+    const float *texels;
+    int size_px;
+    double forward[3]; /* unit vector, the view's depth axis */
+    double rgb[3];
+    int levels; /* texels are merged in blocks of 2^levels at most         */
+};
+
+/*
+ * Append the samples of one view: each block of 2^levels texels a side is halved, across the side that is
+ * longer on the surface, until both extents on the surface (size across the view and depth range) are at
+ * most spacing_mm, or one texel is left. Neighbours in the list are near each other in space.
+ * Fails with DIPOLE_OUT_OF_MEMORY.
+ */
+DIPOLE_CHECKED bool render_light_samples_append(struct render_light_samples *samples,
+                                                const struct render_light_view *view, double spacing_mm,
+                                                dipole_status *status);
+
+/*
+ * Append to *merged one sample for each cube of side cell_mm that holds samples: total flux, flux-weighted
+ * mean position. They are ordered along a space-filling curve. Fails with DIPOLE_OUT_OF_MEMORY.
+ */
+DIPOLE_CHECKED bool render_light_samples_merge(const struct render_light_samples *samples, double cell_mm,
+                                               struct render_light_samples *merged, dipole_status *status);
+
+void render_light_samples_destroy(struct render_light_samples *samples);
+
+#endif

@@ -1,0 +1,34 @@
+/* What the composite would do to the radiosity, kept as numbers: exit factor, coverage, and how much of the
+ * pixel shows the surface that its radiosity was computed for. */
+#include "renderer/effects.h"
+#include "renderer/execute.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    (void)plan;
+    return request->is_captured ? render_called_for("asked for") : render_not_called_for("not asked for");
+}
+
+static void bind(const struct render_frame *frame)
+{
+    render_set_camera(frame->program, frame->plan);
+    render_set_exit(frame->program, frame->plan);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "capture",
+      .draw = RENDER_DRAW_FULLSCREEN,
+      .reads = { "surface_position_mm", "surface_normal", "position_mm", "normal" },
+      .writes = { "capture" },
+      .bind = bind },
+};
+
+const struct render_effect render_effect_capture = {
+    .name = "capture",
+    .source = "the composite without scattering",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

@@ -1,0 +1,37 @@
+/* The picture: radiosity leaves through the surface toward the eye (theory.md T14), specular light is
+ * added, and the four points of each pixel are averaged. */
+#include "renderer/effects.h"
+#include "renderer/execute.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    (void)plan;
+    if (request->is_captured)
+        return render_not_called_for("its parts are captured instead");
+    return render_called_for("4 points per pixel");
+}
+
+static void bind(const struct render_frame *frame)
+{
+    render_set_camera(frame->program, frame->plan);
+    render_set_exit(frame->program, frame->plan);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "composite",
+      .draw = RENDER_DRAW_FULLSCREEN,
+      .reads = { "surface_position_mm", "surface_normal", "position_mm", "normal" },
+      .reads_if_written = { "radiosity", "specular" },
+      .writes = { "radiance" },
+      .bind = bind },
+};
+
+const struct render_effect render_effect_composite = {
+    .name = "composite",
+    .source = "Fresnel exit normalised to the radiosity",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

@@ -1,0 +1,37 @@
+/* The light's view, reduced to samples no farther apart than the profile's spectrum allows (theory.md T11,
+ * T13). */
+#include "renderer/effects.h"
+#include "renderer/execute.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    if (plan->lit_count == 0)
+        return render_not_called_for("no light shines");
+    if (request->is_captured)
+        return render_called_for("captured, %.3g mm apart", plan->spacing_mm);
+    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+        return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
+    if (!plan->has_scattering)
+        return render_not_called_for("no channel scatters");
+    return render_called_for("%.3g mm apart keep aliasing under %.3g", plan->spacing_mm,
+                             plan->aliasing_epsilon);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "light_samples",
+      .draw = RENDER_DRAW_NOTHING,
+      .is_per_view = true,
+      .reads = { "light_view" },
+      .writes = { "light_samples" },
+      .run = render_executor_sample_light_view },
+};
+
+const struct render_effect render_effect_light_samples = {
+    .name = "light_samples",
+    .source = "Shah, Konttinen and Pattanaik 2009; spacing by the sampling theorem",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

@@ -1,0 +1,45 @@
+/* What a light sees: the position of each texel's surface, and the share of the light's power that enters
+ * there (theory.md T13). Both light samples and shadows are taken from it. */
+#include "renderer/effects.h"
+#include "renderer/execute.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    if (plan->lit_count == 0)
+        return render_not_called_for("no light shines");
+    if (!plan->has_scattering && !plan->has_specular)
+        return render_not_called_for("no channel scatters and no surface is glossy");
+    return render_called_for("%zu of %zu lights shine, seen in %zu view%s of up to %d texels a side",
+                             plan->lit_count, request->scene->light_count, plan->view_count,
+                             plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
+}
+
+static void bind(const struct render_frame *frame)
+{
+    const struct render_plan_view *const view = frame->view;
+    const struct io_light *const light = &frame->request->scene->lights[view->light];
+    render_set_matrix(frame->program, "view_projection", &view->projection);
+    render_set_light(frame->program, light);
+    render_set_vec3(frame->program, "forward_ws", view->projection.forward);
+    render_set_float(frame->program, "texel_area", view->texel_area);
+    render_set_float(frame->program, "eta", frame->plan->eta);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "light_view",
+      .draw = RENDER_DRAW_SCENE,
+      .is_per_view = true,
+      .writes = { "light_view" },
+      .depth_written = "light_depth",
+      .bind = bind },
+};
+
+const struct render_effect render_effect_light_view = {
+    .name = "light_view",
+    .source = "reflective shadow maps, Dachsbacher and Stamminger 2005; flux instead of irradiance",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

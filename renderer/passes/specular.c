@@ -1,0 +1,40 @@
+/* Light mirrored at the rough surface: GGX, with the shadows of the light's view (theory.md T19). */
+#include "renderer/effects.h"
+#include "renderer/execute.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    (void)request;
+    if (!plan->has_specular)
+        return render_not_called_for("no object is glossy");
+    if (plan->lit_count == 0)
+        return render_not_called_for("no light shines");
+    return render_called_for("an object is glossy");
+}
+
+static void bind(const struct render_frame *frame)
+{
+    render_set_light_view(frame->program, frame->request, frame->view);
+    render_set_camera(frame->program, frame->plan);
+    render_set_float(frame->program, "eta", frame->plan->eta);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "specular",
+      .draw = RENDER_DRAW_FULLSCREEN,
+      .is_per_view = true,
+      .is_added = true,
+      .reads = { "surface_position_mm", "surface_normal", "light_view" },
+      .writes = { "specular" },
+      .bind = bind },
+};
+
+const struct render_effect render_effect_specular = {
+    .name = "specular",
+    .source = "GGX, Walter et al. 2007; height-correlated Smith, Heitz 2014",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

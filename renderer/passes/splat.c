@@ -1,0 +1,37 @@
+/* Subsurface scattering: every light sample adds flux times R_d(distance) to the pixels within r_max of it
+ * (theory.md T14). */
+#include "renderer/effects.h"
+#include "renderer/execute.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    if (request->is_captured)
+        return render_not_called_for("captured without scattering");
+    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+        return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
+    if (!plan->has_scattering)
+        return render_not_called_for("no channel scatters");
+    if (plan->lit_count == 0)
+        return render_not_called_for("no light shines");
+    return render_called_for("scattered light reaches %.3g mm, %.3g pixels", plan->r_max_mm,
+                             plan->r_max_px);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "splat",
+      .draw = RENDER_DRAW_SPLATS,
+      .is_added = true,
+      .reads = { "position_mm", "light_samples" },
+      .writes = { "radiosity" },
+      .depth_tested = "position_depth" },
+};
+
+const struct render_effect render_effect_splat = {
+    .name = "splat",
+    .source = "Shah, Konttinen and Pattanaik 2009",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

@@ -1,0 +1,292 @@
+#include "renderer/render.h"
+
+#include "renderer/context.h"
+#include "renderer/execute.h"
+#include "renderer/renderer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static double now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec * 1e3 + (double)now.tv_nsec * 1e-6;
+}
+
+bool render_create(const struct io_scene *scene, enum render_context_kind kind,
+                   struct renderer **renderer_out, dipole_status *status)
+{
+    *renderer_out = NULL;
+    if (!render_plan_check_media(scene, status))
+        return false;
+    struct renderer *const renderer = calloc(1, sizeof *renderer);
+    if (!renderer)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a renderer");
+    renderer->scene = scene;
+    const bool done = render_context_create(kind, &renderer->context, status) &&
+                      renderer->context->make_current(renderer->context, status) &&
+                      render_gl_start(renderer->context->load, &renderer->errors, status) &&
+                      render_executor_create(scene, &renderer->errors, &renderer->executor, status);
+    if (done)
+        *renderer_out = renderer;
+    else
+        render_destroy(renderer);
+    return done;
+}
+
+void render_destroy(struct renderer *renderer)
+{
+    if (!renderer)
+        return;
+    if (renderer->executor && render_make_current(renderer, NULL))
+        render_executor_destroy(renderer->executor);
+    render_context_destroy(renderer->context);
+    lut_splat1d_destroy(renderer->table);
+    free(renderer);
+}
+
+bool render_make_current(struct renderer *renderer, dipole_status *status)
+{
+    /* Functions of one kind of context are not those of another: load them again each time. */
+    return renderer->context->make_current(renderer->context, status) &&
+           render_gl_start(renderer->context->load, &renderer->errors, status);
+}
+
+/* The table that the plan splats with: the caller's, or one baked now and kept for later calls. */
+static bool table_for(struct renderer *renderer, const struct render_request *request,
+                      const struct render_plan *plan, const struct lut_splat1d **table_out,
+                      dipole_status *status)
+{
+    *table_out = request->table;
+    if (request->table || !render_plan_reads(plan, "light_samples"))
+        return true;
+    if (!renderer->table || renderer->table->epsilon > plan->table_epsilon) {
+        lut_splat1d_destroy(renderer->table);
+        renderer->table = NULL;
+        if (!lut_splat1d_bake(&renderer->scene->objects[0].material, plan->table_epsilon, &renderer->table,
+                              status))
+            return false;
+    }
+    *table_out = renderer->table;
+    return true;
+}
+
+bool render_run(struct renderer *renderer, const struct render_request *request,
+                struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
+{
+    const struct lut_splat1d *table;
+    *plan_out = NULL;
+    struct render_plan *plan = NULL;
+    const bool done = render_plan_create(request, &plan, status) && render_make_current(renderer, status) &&
+                      table_for(renderer, request, plan, &table, status) &&
+                      render_executor_run(renderer->executor, request, plan, table, time_ms, status);
+    if (done)
+        *plan_out = plan;
+    else
+        render_plan_destroy(plan);
+    return done;
+}
+
+void render_fill_report(const struct renderer *renderer, const struct render_plan *plan,
+                        const double time_ms[RENDER_EFFECT_LIMIT], struct render_report *report)
+{
+    const bool is_splatted = render_plan_reads(plan, "light_samples");
+    *report = (struct render_report){
+        .technique = plan->technique,
+        .epsilon = plan->epsilon,
+        .error_predicted = plan->error_predicted,
+        .truncation_error = plan->truncation_error,
+        .aliasing_error = plan->aliasing_error,
+        .banding_error = plan->banding_error,
+        .table_error = plan->table_error,
+        .band_count = plan->band_count,
+        .r_max_mm = is_splatted ? plan->r_max_mm : 0,
+        .spacing_mm = is_splatted ? plan->spacing_mm : 0,
+        .sample_count = render_executor_samples(renderer->executor)->count,
+        .splat_count = render_executor_splat_count(renderer->executor),
+        .view_count = plan->view_count,
+        .effect_count = plan->effect_count,
+        .note_count = plan->note_count,
+    };
+    for (size_t e = 0; e < plan->effect_count; e++) {
+        report->effects[e].name = render_effects[e]->name;
+        report->effects[e].is_active = plan->decisions[e].is_active;
+        report->effects[e].time_ms = time_ms[e];
+        memcpy(report->effects[e].reason, plan->decisions[e].reason, sizeof report->effects[e].reason);
+    }
+    memcpy(report->notes, plan->notes, sizeof report->notes);
+}
+
+static void set_attributes(struct io_image *image, const struct io_scene *scene,
+                           const struct render_plan *plan)
+{
+    io_image_set_text(image, "dipole:kind", "picture");
+    io_image_set_text(image, "dipole:version", dipole_version());
+    io_image_set_text(image, "dipole:technique", render_technique_names[plan->technique]);
+    io_image_set_text(image, "dipole:material", scene->objects[0].material.name);
+    io_image_set_number(image, "dipole:epsilon", plan->epsilon);
+    if (render_plan_reads(plan, "light_samples")) {
+        io_image_set_number(image, "dipole:error_predicted", plan->error_predicted);
+        io_image_set_number(image, "dipole:r_max_mm", plan->r_max_mm);
+        io_image_set_number(image, "dipole:spacing_mm", plan->spacing_mm);
+        io_image_set_number(image, "dipole:banding_error", plan->banding_error);
+        io_image_set_number(image, "dipole:table_error", plan->table_error);
+    }
+}
+
+bool render_draw(struct renderer *renderer, const struct render_options *options,
+                 struct io_image **image_out, struct render_report *report_out, dipole_status *status)
+{
+    const double start_ms = now_ms();
+    const struct render_request request = {
+        .scene = renderer->scene,
+        .technique = options->technique,
+        .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
+        .table = options->table,
+        .is_tone_mapped = options->is_tone_mapped,
+    };
+    double time_ms[RENDER_EFFECT_LIMIT];
+    struct render_plan *plan = NULL;
+    struct io_image *image = NULL;
+    *image_out = NULL;
+    const bool done =
+        render_run(renderer, &request, &plan, time_ms, status) &&
+        io_image_create(plan->width_px, plan->height_px, 4, &image, status) &&
+        render_executor_read(renderer->executor, options->is_tone_mapped ? "display" : "radiance",
+                             image->pixels, status);
+    if (done) {
+        set_attributes(image, renderer->scene, plan);
+        *image_out = image;
+    } else {
+        io_image_destroy(image);
+    }
+    if (done && report_out) {
+        render_fill_report(renderer, plan, time_ms, report_out);
+        report_out->total_ms = now_ms() - start_ms;
+    }
+    render_plan_destroy(plan);
+    return done;
+}
+
+/* ---- capture ------------------------------------------------------------------------------------ */
+
+static struct render_capture *capture_create(int width_px, int height_px)
+{
+    const size_t pixel_count = (size_t)width_px * (size_t)height_px;
+    struct render_capture *const capture = calloc(1, sizeof *capture);
+    if (!capture)
+        return NULL;
+    capture->width_px = width_px;
+    capture->height_px = height_px;
+    capture->position_mm = calloc(pixel_count, 3 * sizeof *capture->position_mm);
+    capture->coverage = calloc(pixel_count, sizeof *capture->coverage);
+    capture->exit_per_sr = calloc(pixel_count, sizeof *capture->exit_per_sr);
+    capture->specular = calloc(pixel_count, 3 * sizeof *capture->specular);
+    if (capture->position_mm && capture->coverage && capture->exit_per_sr && capture->specular)
+        return capture;
+    render_capture_destroy(capture);
+    return NULL;
+}
+
+void render_capture_destroy(struct render_capture *capture)
+{
+    if (!capture)
+        return;
+    free(capture->position_mm);
+    free(capture->coverage);
+    free(capture->exit_per_sr);
+    free(capture->specular);
+    render_light_samples_destroy(&capture->samples);
+    free(capture);
+}
+
+static void copy_rgb(const float *rgba, size_t pixel_count, float *rgb)
+{
+    for (size_t i = 0; i < pixel_count; i++)
+        memcpy(rgb + 3 * i, rgba + 4 * i, 3 * sizeof *rgb);
+}
+
+/* Whether pixel (x, y) and its neighbours are covered by four points of one surface each. */
+static bool is_interior(const float *parts, int width_px, int height_px, int x, int y)
+{
+    for (int j = y > 0 ? y - 1 : 0; j <= y + 1 && j < height_px; j++) {
+        for (int i = x > 0 ? x - 1 : 0; i <= x + 1 && i < width_px; i++) {
+            if (parts[4 * ((size_t)j * (size_t)width_px + (size_t)i) + 1] < 1)
+                return false;
+        }
+    }
+    return parts[4 * ((size_t)y * (size_t)width_px + (size_t)x) + 2] >= 1;
+}
+
+static void take_parts(const float *parts, struct render_capture *capture)
+{
+    /* Three of four points covered: what a pixel that is not exact claims at most. */
+    const float inexact = 0.75f;
+    for (int y = 0; y < capture->height_px; y++) {
+        for (int x = 0; x < capture->width_px; x++) {
+            const size_t i = (size_t)y * (size_t)capture->width_px + (size_t)x;
+            const bool is_exact = is_interior(parts, capture->width_px, capture->height_px, x, y);
+            capture->exit_per_sr[i] = parts[4 * i];
+            capture->coverage[i] = is_exact ? 1 : fminf(parts[4 * i + 1], inexact);
+        }
+    }
+}
+
+static bool capture_read(struct renderer *renderer, const struct render_plan *plan, float *rgba,
+                         struct render_capture *capture, dipole_status *status)
+{
+    const size_t pixel_count = (size_t)capture->width_px * (size_t)capture->height_px;
+    if (!render_executor_read(renderer->executor, "position_mm", rgba, status))
+        return false;
+    copy_rgb(rgba, pixel_count, capture->position_mm);
+    if (!render_executor_read(renderer->executor, "capture", rgba, status))
+        return false;
+    take_parts(rgba, capture);
+    if (!render_plan_writes(plan, "specular"))
+        return true;
+    if (!render_executor_read(renderer->executor, "specular", rgba, status))
+        return false;
+    copy_rgb(rgba, pixel_count, capture->specular);
+    return true;
+}
+
+bool render_capture_create(struct renderer *renderer, double spacing_mm,
+                           struct render_capture **capture_out, dipole_status *status)
+{
+    *capture_out = NULL;
+    if (!(spacing_mm > 0))
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "spacing_mm is %g, expected > 0", spacing_mm);
+    const struct render_request request = { .scene = renderer->scene,
+                                            .technique = RENDER_TECHNIQUE_SPLAT,
+                                            .epsilon = RENDER_EPSILON_DEFAULT,
+                                            .spacing_mm = spacing_mm,
+                                            .is_captured = true };
+    const struct io_camera *const camera = &renderer->scene->camera;
+    double time_ms[RENDER_EFFECT_LIMIT];
+    struct render_plan *plan = NULL;
+    if (!render_run(renderer, &request, &plan, time_ms, status))
+        return false;
+    struct render_capture *const capture = capture_create(camera->width_px, camera->height_px);
+    float *const rgba = calloc((size_t)camera->width_px * (size_t)camera->height_px, 4 * sizeof *rgba);
+    bool done = capture && rgba;
+    if (!done)
+        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to capture a picture of %dx%d",
+                    camera->width_px, camera->height_px);
+    done = done && capture_read(renderer, plan, rgba, capture, status);
+    if (done) {
+        /* The executor makes new samples in its next run: these are the capture's now. */
+        struct render_light_samples *const samples = render_executor_samples(renderer->executor);
+        capture->samples = *samples;
+        *samples = (struct render_light_samples){ 0 };
+        *capture_out = capture;
+    } else {
+        render_capture_destroy(capture);
+    }
+    free(rgba);
+    render_plan_destroy(plan);
+    return done;
+}

@@ -1,0 +1,108 @@
+/* Draws scenes of translucent objects off screen. Knows no file formats; plan.h says what is drawn. */
+#ifndef RENDERER_RENDER_H
+#define RENDERER_RENDER_H
+
+#include "io/exr.h"
+#include "io/scene_file.h"
+#include "lutgen/lut.h"
+#include "renderer/light_samples.h"
+
+/* Where OpenGL 4.5 comes from. The default tries OSMesa, then EGL. */
+enum render_context_kind {
+    RENDER_CONTEXT_DEFAULT = 0,
+    RENDER_CONTEXT_OSMESA,
+    RENDER_CONTEXT_EGL,
+    RENDER_CONTEXT_WINDOW, /* GLFW, hidden; needs a display */
+};
+
+/* The default takes splats, or Lambert where scattering stays within a pixel. */
+enum render_technique { RENDER_TECHNIQUE_AUTO = 0, RENDER_TECHNIQUE_SPLAT, RENDER_TECHNIQUE_LAMBERT };
+extern const char *const render_technique_names[]; /* "auto", "splat", "lambert", NULL */
+
+/* epsilon: asked relative error of the radiosity. */
+#define RENDER_EPSILON_DEFAULT 0.01
+#define RENDER_EPSILON_MIN 1e-5
+#define RENDER_EPSILON_MAX 0.5
+
+/* Largest picture: sides and pixels (a pixel takes about 230 bytes while it is drawn). */
+enum { RENDER_SIDE_LIMIT = 16384 };
+#define RENDER_PIXEL_LIMIT ((size_t)1 << 24)
+
+/* Draws one scene, any number of times. End it with render_destroy. */
+struct renderer;
+
+/*
+ * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
+ * and lights may change between calls, its objects may not.
+ * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed),
+ * DIPOLE_BAD_VALUE (objects of different media) or DIPOLE_OUT_OF_MEMORY.
+ */
+DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
+                                  struct renderer **renderer_out, dipole_status *status);
+void render_destroy(struct renderer *renderer);
+
+struct render_options {
+    enum render_technique technique;
+    double epsilon;                  /* 0: RENDER_EPSILON_DEFAULT                              */
+    const struct lut_splat1d *table; /* of the scene's medium; NULL: baked in memory           */
+    bool is_tone_mapped;             /* 0..1 over the scene's background, for a PNG; else
+                                        linear radiance, premultiplied by coverage (alpha)     */
+};
+
+enum { RENDER_EFFECT_LIMIT = 16, RENDER_NOTE_LIMIT = 4 };
+
+struct render_effect_report {
+    const char *name;
+    bool is_active;
+    char reason[160];
+    double time_ms;
+};
+
+/* What was done, why, and how long it took. */
+struct render_report {
+    enum render_technique technique; /* never AUTO */
+    double epsilon;
+    double error_predicted; /* the sum of these four */
+    double truncation_error, aliasing_error, banding_error, table_error;
+    double r_max_mm, spacing_mm; /* 0 when not splatted */
+    size_t sample_count;         /* at the finest */
+    size_t splat_count, view_count;
+    int band_count;
+    struct render_effect_report effects[RENDER_EFFECT_LIMIT];
+    size_t effect_count;
+    double total_ms;
+    char notes[RENDER_NOTE_LIMIT][256]; /* promises that could not be kept */
+    size_t note_count;
+};
+
+/*
+ * Draw the scene as its camera, lights and *options say into a new picture of 4 channels, with attributes
+ * dipole:technique, dipole:epsilon and others. *report_out may be NULL.
+ * Fails with DIPOLE_BAD_VALUE, DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED; *image_out is then NULL.
+ */
+DIPOLE_CHECKED bool render_draw(struct renderer *renderer, const struct render_options *options,
+                                struct io_image **image_out, struct render_report *report_out,
+                                dipole_status *status);
+
+/*
+ * What a picture is made of beside the profile, in arrays of width_px x height_px pixels, rows from the
+ * top: radiance = exit_per_sr x radiosity + specular, where radiosity [W/mm^2] at position_mm is the sum
+ * over the samples of flux_w x R_d(|position_mm - sample position|). theory.md T13, T14.
+ */
+struct render_capture {
+    int width_px, height_px;
+    float *position_mm;                  /* x 3; 0 where no object is                               */
+    float *coverage;                     /* 0 to 1; 1 only where the equation above holds exactly:
+                                            the pixel and its 3 x 3 neighbours are wholly covered, and
+                                            the pixel shows a single surface                        */
+    float *exit_per_sr;                  /* radiance leaving toward the eye per radiosity           */
+    float *specular;                     /* x 3, radiance                                           */
+    struct render_light_samples samples; /* spacing_mm apart or less                                */
+};
+
+/* Fails as render_draw does; the caller ends *capture_out with render_capture_destroy. spacing_mm > 0. */
+DIPOLE_CHECKED bool render_capture_create(struct renderer *renderer, double spacing_mm,
+                                          struct render_capture **capture_out, dipole_status *status);
+void render_capture_destroy(struct render_capture *capture);
+
+#endif

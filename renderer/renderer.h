@@ -1,0 +1,27 @@
+/* Inside the library: what render.c and view.c share. */
+#ifndef RENDERER_RENDERER_H
+#define RENDERER_RENDERER_H
+
+#include "renderer/context.h"
+#include "renderer/execute.h"
+
+struct renderer {
+    const struct io_scene *scene;
+    struct render_context *context;
+    struct render_gl_errors errors;
+    struct render_executor *executor;
+    struct lut_splat1d *table; /* baked when a plan first needed one */
+};
+
+DIPOLE_CHECKED bool render_make_current(struct renderer *renderer, dipole_status *status);
+
+/* Plan and draw; the textures stay with the executor, *plan_out is the caller's to destroy. */
+DIPOLE_CHECKED bool render_run(struct renderer *renderer, const struct render_request *request,
+                               struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT],
+                               dipole_status *status);
+
+/* Everything but total_ms. */
+void render_fill_report(const struct renderer *renderer, const struct render_plan *plan,
+                        const double time_ms[RENDER_EFFECT_LIMIT], struct render_report *report);
+
+#endif

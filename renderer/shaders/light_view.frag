@@ -1,0 +1,22 @@
+// Pass light_view: position, and the share of the light's power that enters through the texel
+// (theory.md T13): transmittance times area, or times solid angle for a point light. No cosine:
+// irradiance falls with it as the surface grows with it.
+#include "common/direction.glsl"
+#include "common/fresnel.glsl"
+in vec3 position_ws_mm;
+in vec3 normal_ws;
+uniform vec4 light;         // w = 1: position, mm; w = 0: direction toward the light
+uniform vec3 forward_ws;
+uniform float texel_area;   // mm^2; point: at distance 1
+uniform float eta;
+layout(location = 0) out vec4 position_and_share;
+
+void main()
+{
+    vec3 to_light = toward(light, position_ws_mm);
+    float cosine = clamp(dot(normalize(normal_ws), to_light), 0.0, 1.0);
+    float axis_cosine = light.w > 0.0 ? -dot(to_light, forward_ws) : 1.0;
+    float size = texel_area * axis_cosine * axis_cosine * axis_cosine;
+    float share = gl_FrontFacing ? size * (1.0 - fresnel_reflectance(eta, cosine)) : 0.0;
+    position_and_share = vec4(position_ws_mm, share);
+}

@@ -1,0 +1,16 @@
+// Pass splat: a rectangle that holds everything the splat's samples reach, at the depth of the nearest:
+// pixels that are nearer, or empty, fail the depth test.
+layout(location = 0) in vec4 rectangle;  // left, bottom, right, top in -1..1
+layout(location = 1) in float depth;     // 0..1
+layout(location = 2) in uvec2 range;     // first sample, how many
+layout(location = 3) in vec4 ball;       // middle of the samples, mm; reach from there, squared
+flat out ivec2 samples_of_splat;
+flat out vec4 ball_of_splat;
+
+void main()
+{
+    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    gl_Position = vec4(mix(rectangle.xy, rectangle.zw, corner), 2.0 * depth - 1.0, 1.0);
+    samples_of_splat = ivec2(range);
+    ball_of_splat = ball;
+}

@@ -1,0 +1,87 @@
+#include "renderer/splats.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* A group may be so wide, as part of r_max: a rectangle grows by as much for all its samples. */
+#define GROUP_RADIUS 0.15
+
+/* Positions in the picture are floats. */
+#define REACH_SLACK 1e-4
+
+struct box {
+    double min[3], max[3];
+};
+
+static void box_add(struct box *box, const float position_mm[3])
+{
+    for (int k = 0; k < 3; k++) {
+        box->min[k] = fmin(box->min[k], (double)position_mm[k]);
+        box->max[k] = fmax(box->max[k], (double)position_mm[k]);
+    }
+}
+
+static double box_radius_mm(const struct box *box)
+{
+    double diagonal2 = 0;
+    for (int k = 0; k < 3; k++)
+        diagonal2 += (box->max[k] - box->min[k]) * (box->max[k] - box->min[k]);
+    return 0.5 * sqrt(diagonal2);
+}
+
+/* One past the last sample of the group that begins at first; its box in *box. */
+static size_t group_end(const struct render_light_samples *samples, size_t first, double radius_limit_mm,
+                        struct box *box)
+{
+    *box = (struct box){ { INFINITY, INFINITY, INFINITY }, { -INFINITY, -INFINITY, -INFINITY } };
+    size_t end = first;
+    while (end < samples->count && end - first < RENDER_SPLAT_SAMPLES) {
+        struct box grown = *box;
+        box_add(&grown, samples->samples[end].position_mm);
+        if (end > first && box_radius_mm(&grown) > radius_limit_mm)
+            break;
+        *box = grown;
+        end++;
+    }
+    return end;
+}
+
+bool render_splats_create(const struct render_light_samples *samples,
+                          const struct render_projection *camera, double r_max_mm,
+                          struct render_splats *out, dipole_status *status)
+{
+    *out = (struct render_splats){ 0 };
+    struct box box;
+    size_t capacity = 0;
+    for (size_t first = 0; first < samples->count; capacity++)
+        first = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
+    out->splats = calloc(capacity + 1, sizeof *out->splats);
+    if (!out->splats)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu splats", capacity);
+    for (size_t first = 0, end; first < samples->count; first = end) {
+        end = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
+        double centre_mm[3], in_view_mm[3], rectangle[4];
+        for (int k = 0; k < 3; k++)
+            centre_mm[k] = 0.5 * (box.min[k] + box.max[k]);
+        const double reach_mm = (r_max_mm + box_radius_mm(&box)) * (1 + REACH_SLACK);
+        if (!render_projection_bound_sphere(camera, centre_mm, reach_mm, rectangle))
+            continue;
+        render_projection_to_view(camera, centre_mm, in_view_mm);
+        struct render_splat *const splat = &out->splats[out->count++];
+        for (int k = 0; k < 4; k++)
+            splat->rectangle[k] = (float)rectangle[k];
+        for (int k = 0; k < 3; k++)
+            splat->centre_mm[k] = (float)centre_mm[k];
+        splat->reach2_mm2 = (float)(reach_mm * reach_mm);
+        splat->depth = (float)render_projection_linear_depth(camera, in_view_mm[2] - reach_mm);
+        splat->first = (uint32_t)first;
+        splat->count = (uint32_t)(end - first);
+    }
+    return true;
+}
+
+void render_splats_destroy(struct render_splats *splats)
+{
+    free(splats->splats);
+    *splats = (struct render_splats){ 0 };
+}

@@ -1,0 +1,501 @@
+/* renderer/plan.c, projection.c, bands.c, splats.c: everything that is decided before OpenGL is called. */
+#include "check.h"
+#include "scenes.h"
+
+#include "renderer/plan.h"
+#include "renderer/splats.h"
+
+static struct render_request request_for(const struct test_scene *test)
+{
+    return (struct render_request){ .scene = &test->scene, .epsilon = 0.01 };
+}
+
+static struct render_plan *plan_for(const struct render_request *request)
+{
+    struct render_plan *plan;
+    dipole_status status;
+    if (!render_plan_create(request, &plan, &status))
+        fail_msg("%s", status.message);
+    return plan;
+}
+
+/* A marble sphere of radius 8 mm under one directional light. */
+static void init_sphere(struct test_scene *test)
+{
+    const struct io_material material = marble();
+    scene_init(test, 40);
+    assert_true(scene_add(test, IO_PRIMITIVE_SPHERE, 32, 8, 0, &material));
+    scene_add_directional(test, -1, -1, -1, 3);
+}
+
+static bool is_active(const struct render_plan *plan, const char *name)
+{
+    for (size_t e = 0; render_effects[e]; e++) {
+        if (strcmp(render_effects[e]->name, name) == 0)
+            return plan->decisions[e].is_active;
+    }
+    fail_msg("no effect %s", name);
+    return false;
+}
+
+/* ---- effects and passes ------------------------------------------------------------------------- */
+
+/* Oracle: the list itself. Each effect is called for by one of these requests and, but for the surface,
+ * not by another, and says why. */
+static void every_effect_is_called_for_by_some_scene_only(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    init_sphere(&test);
+    struct render_request requests[5];
+    for (int i = 0; i < 5; i++)
+        requests[i] = request_for(&test);
+    requests[1].technique = RENDER_TECHNIQUE_LAMBERT;
+    requests[2].is_captured = true;
+    requests[3].is_tone_mapped = true;
+    bool was_active[RENDER_EFFECT_LIMIT] = { false }, was_inactive[RENDER_EFFECT_LIMIT] = { false };
+    for (int i = 0; i < 5; i++) {
+        test.objects[0].has_specular = i == 3;
+        test.scene.light_count = i == 4 ? 0 : 1;
+        struct render_plan *const plan = plan_for(&requests[i]);
+        for (size_t e = 0; render_effects[e]; e++) {
+            assert_true(strlen(plan->decisions[e].reason) > 5);
+            was_active[e] |= plan->decisions[e].is_active;
+            was_inactive[e] |= !plan->decisions[e].is_active;
+        }
+        render_plan_destroy(plan);
+    }
+    for (size_t e = 0; render_effects[e]; e++) {
+        assert_true(was_active[e]);
+        assert_true(was_inactive[e] || strcmp(render_effects[e]->name, "surface") == 0);
+    }
+    scene_end(&test);
+}
+
+/* Oracle: a scene of which nothing is called for but its outline. */
+static void a_dark_scene_needs_no_light_passes(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    init_sphere(&test);
+    memset(test.lights[0].rgb, 0, sizeof test.lights[0].rgb);
+    const struct render_request request = request_for(&test);
+    struct render_plan *const plan = plan_for(&request);
+    assert_int_equal(plan->view_count, 0);
+    assert_int_equal(plan->pass_count, 3); /* surface, surface_resolve, composite */
+    assert_false(is_active(plan, "splat"));
+    render_plan_destroy(plan);
+    scene_end(&test);
+}
+
+/* Oracle: the rule that makes a plan: what is read must have been written; both names are told. */
+static void a_texture_read_before_it_is_written_fails_the_plan(void **state)
+{
+    (void)state;
+    static const struct render_pass needy[] = {
+        { .name = "needy", .reads = { "radiosity" }, .writes = { "radiance" } }
+    };
+    static const struct render_pass giving[] = { { .name = "giving", .writes = { "radiosity" } } };
+    static const struct render_effect first = { .name = "first", .passes = needy, .pass_count = 1 };
+    static const struct render_effect second = { .name = "second", .passes = giving, .pass_count = 1 };
+    const struct render_effect *const wrong[] = { &first, &second, NULL };
+    const struct render_effect *const right[] = { &second, &first, NULL };
+    for (int is_right = 0; is_right < 2; is_right++) {
+        struct render_plan *const plan = calloc(1, sizeof *plan);
+        assert_non_null(plan);
+        plan->decisions[0].is_active = plan->decisions[1].is_active = true;
+        dipole_status status = { 0 };
+        assert_int_equal(render_plan_add_passes(plan, is_right ? right : wrong, &status), is_right);
+        if (!is_right)
+            assert_string_equal(
+                status.message,
+                "pass \"needy\" reads texture \"radiosity\" before any pass has written it");
+        render_plan_destroy(plan);
+    }
+}
+
+/* Oracle: by hand. Passes per view stand together, view after view; the others once, around them. */
+static void passes_per_view_are_repeated_together(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    init_sphere(&test);
+    scene_add_directional(&test, 1, 0, 0, 1);
+    test.objects[0].has_specular = true;
+    const struct render_request request = request_for(&test);
+    struct render_plan *const plan = plan_for(&request);
+    static const char *const names[] = { "surface",  "surface_resolve", "light_view",    "light_samples",
+                                         "specular", "light_view",      "light_samples", "specular",
+                                         "splat",    "composite" };
+    assert_int_equal(plan->pass_count, sizeof names / sizeof *names);
+    for (size_t i = 0; i < plan->pass_count; i++) {
+        assert_string_equal(plan->passes[i].pass->name, names[i]);
+        assert_int_equal(plan->passes[i].view, i >= 5 && i < 8);
+    }
+    render_plan_destroy(plan);
+    scene_end(&test);
+}
+
+/* Oracle: every texture that a pass names is in the table. */
+static void every_texture_has_a_row(void **state)
+{
+    (void)state;
+    for (size_t e = 0; render_effects[e]; e++) {
+        for (size_t p = 0; p < render_effects[e]->pass_count; p++) {
+            const struct render_pass *const pass = &render_effects[e]->passes[p];
+            for (int r = 0; r < RENDER_PASS_READS; r++) {
+                assert_true(!pass->reads[r] || render_texture_find(pass->reads[r]));
+                assert_true(!pass->reads_if_written[r] || render_texture_find(pass->reads_if_written[r]));
+            }
+            for (int w = 0; w < RENDER_PASS_WRITES; w++)
+                assert_true(!pass->writes[w] || render_texture_find(pass->writes[w]));
+            assert_true(!pass->depth_written || render_texture_find(pass->depth_written));
+            assert_true(!pass->depth_tested || render_texture_find(pass->depth_tested));
+        }
+    }
+    assert_null(render_texture_find("nonsense"));
+}
+
+/* ---- accuracy ----------------------------------------------------------------------------------- */
+
+/* Oracle: the closed forms of libdipole, which the plan must meet channel by channel. */
+static void the_error_budget_is_kept(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    const struct io_material material = skin1();
+    scene_init(&test, 400);
+    assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 32, 80, 0, &material));
+    scene_add_directional(&test, -1, -1, -1, 3);
+    const double epsilons[] = { 0.1, 0.01, 0.001, 1e-4 };
+    for (int i = 0; i < 4; i++) {
+        struct render_request request = request_for(&test);
+        request.epsilon = epsilons[i];
+        struct render_plan *const plan = plan_for(&request);
+        double tail = 0, alias = 0;
+        for (int c = 0; c < 3; c++) {
+            const dipole_coefficients *const k = &plan->coefficients[c];
+            tail = fmax(tail, dipole_tail_fraction(k, plan->r_max_mm));
+            alias = fmax(alias,
+                         4 * dipole_spectrum(k, 2 * acos(-1) / plan->spacing_mm) / dipole_spectrum(k, 0));
+        }
+        assert_close(tail, 0.1 * epsilons[i], 1e-6, "tail at epsilon %g", epsilons[i]);
+        assert_true(alias <= 0.58 * epsilons[i] * (1 + 1e-6));
+        if (plan->note_count == 0)
+            assert_true(plan->error_predicted <= epsilons[i] * (1 + 1e-6));
+        assert_close(plan->error_predicted,
+                     plan->truncation_error + plan->aliasing_error + plan->banding_error +
+                         plan->table_error,
+                     1e-12, "sum at epsilon %g", epsilons[i]);
+        render_plan_destroy(plan);
+    }
+    scene_end(&test);
+}
+
+/* Oracle: the definition. Where scattering stays within a pixel, splats are not called for. */
+static void auto_takes_lambert_when_scattering_is_under_a_pixel(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    init_sphere(&test);
+    struct render_request request = request_for(&test);
+    struct render_plan *near_plan = plan_for(&request);
+    assert_int_equal(near_plan->technique, RENDER_TECHNIQUE_SPLAT);
+    test.scene.camera.eye_mm[2] = 40000;
+    struct render_plan *far_plan = plan_for(&request);
+    assert_true(far_plan->r_max_px < 1);
+    assert_int_equal(far_plan->technique, RENDER_TECHNIQUE_LAMBERT);
+    request.technique = RENDER_TECHNIQUE_SPLAT;
+    struct render_plan *asked_plan = plan_for(&request);
+    assert_int_equal(asked_plan->technique, RENDER_TECHNIQUE_SPLAT);
+    render_plan_destroy(near_plan);
+    render_plan_destroy(far_plan);
+    render_plan_destroy(asked_plan);
+    scene_end(&test);
+}
+
+/* Oracle: 4096 texels over 2000 mm are too coarse for marble: the plan says so and predicts more. */
+static void a_light_view_that_is_too_coarse_is_told(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    const struct io_material material = marble();
+    scene_init(&test, 5000);
+    assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 1000, 0, &material));
+    scene_add_directional(&test, 0, 0, -1, 3);
+    struct render_request request = request_for(&test);
+    request.technique = RENDER_TECHNIQUE_SPLAT;
+    struct render_plan *const plan = plan_for(&request);
+    assert_int_equal(plan->views[0].size_px, 4096);
+    assert_int_equal(plan->note_count, 1);
+    assert_non_null(strstr(plan->notes[0], "light samples are 0.49 mm apart, 0.341 mm were asked"));
+    assert_true(plan->aliasing_error > plan->aliasing_epsilon);
+    render_plan_destroy(plan);
+    scene_end(&test);
+}
+
+/* Oracle: a table's own numbers. A coarse one is used and told; one of another medium is refused. */
+static void the_callers_table_counts(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    const struct io_material material = skin1();
+    scene_init(&test, 400);
+    assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 80, 0, &material));
+    scene_add_directional(&test, 0, 0, -1, 3);
+    struct render_request request = request_for(&test);
+    struct lut_splat1d *coarse = NULL, *other = NULL;
+    const struct io_material another = marble();
+    assert_true(lut_splat1d_bake(&material, 0.05, &coarse, NULL));
+    assert_true(lut_splat1d_bake(&another, 0.05, &other, NULL));
+    request.table = coarse;
+    struct render_plan *plan = plan_for(&request);
+    assert_int_equal(plan->note_count, 1);
+    assert_non_null(strstr(plan->notes[0], "the table was baked with epsilon 0.05"));
+    assert_true(plan->r_max_mm <= coarse->axis.r_max_mm);
+    assert_true(plan->error_predicted > 0.01);
+    render_plan_destroy(plan);
+    request.table = other;
+    dipole_status status;
+    assert_false(render_plan_create(&request, &plan, &status));
+    assert_null(plan);
+    assert_string_equal(status.message,
+                        "the table is of another medium than material \"skin1\": its sigma_a_per_mm in R "
+                        "is 0.0021, the scene's 0.032");
+    lut_splat1d_destroy(coarse);
+    lut_splat1d_destroy(other);
+    scene_end(&test);
+}
+
+/* Oracle: the weights are a partition of unity, and 0 outside the ring that a band claims. */
+static void bands_add_up(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 9 };
+    for (int i = 0; i < 500; i++) {
+        struct render_band bands[RENDER_BAND_LIMIT];
+        const double spacing_mm = log_uniform(&rng, 0.01, 1), r_max_mm = log_uniform(&rng, 0.1, 300);
+        const int count = render_bands_make(spacing_mm, r_max_mm, 6, bands);
+        assert_true(count >= 1 && count <= RENDER_BAND_LIMIT);
+        assert_close(bands[0].spacing_mm, spacing_mm, 0, "case %d", i);
+        for (int j = 0; j < 50; j++) {
+            const double r_mm = uniform(&rng, 0, 1) < 0.1 ? 0 : log_uniform(&rng, 1e-4, 1) * r_max_mm;
+            double sum = 0;
+            for (int b = 0; b < count; b++) {
+                const double weight = render_band_weight(&bands[b], r_mm);
+                assert_true(weight >= 0 && weight <= 1);
+                assert_true(weight == 0 || (r_mm >= bands[b].r_inner_mm && r_mm <= bands[b].r_outer_mm));
+                sum += weight;
+            }
+            assert_close(sum, 1, 1e-14, "case %d at %g mm", i, r_mm);
+        }
+    }
+}
+
+/* ---- views -------------------------------------------------------------------------------------- */
+
+/* Clip coordinates over w. */
+static void project(const struct render_projection *projection, const double position_mm[3], double ndc[3])
+{
+    float m[16];
+    render_projection_matrix(projection, m);
+    double clip[4];
+    for (int row = 0; row < 4; row++) {
+        clip[row] = (double)m[12 + row];
+        for (int k = 0; k < 3; k++)
+            clip[row] += (double)m[4 * k + row] * position_mm[k];
+    }
+    for (int k = 0; k < 3; k++)
+        ndc[k] = clip[k] / clip[3];
+}
+
+/* Oracle: a light must see the whole scene: every vertex lies in the view, or in exactly one cube face. */
+static void every_vertex_is_in_a_lights_view(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 3 };
+    for (int i = 0; i < 60; i++) {
+        struct test_scene test;
+        const struct io_material material = marble();
+        scene_init(&test, 60);
+        assert_true(scene_add(&test, IO_PRIMITIVE_TORUS, 24, 5, uniform(&rng, -5, 5), &material));
+        const double x = uniform(&rng, -1, 1), y = uniform(&rng, -1, 1), z = uniform(&rng, -1, 1);
+        const double distance_mm = i % 3 == 1 ? 4 : 40;
+        if (i % 3 == 0)
+            scene_add_directional(&test, x, y, z, 1);
+        else
+            scene_add_point(&test, distance_mm * x, distance_mm * y, distance_mm * z, 1);
+        const struct render_request request = request_for(&test);
+        struct render_plan *const plan = plan_for(&request);
+        assert_true(plan->view_count == 1 || plan->view_count == 6);
+        assert_true(i % 3 != 1 || plan->view_count == 6 || distance_mm > 3);
+        const struct io_mesh *const mesh = test.objects[0].mesh;
+        for (size_t v = 0; v < mesh->vertex_count; v++) {
+            int seen = 0;
+            for (size_t view = 0; view < plan->view_count; view++) {
+                double position_mm[3], in_view_mm[3], ndc[3];
+                for (size_t k = 0; k < 3; k++)
+                    position_mm[k] = (double)mesh->positions[3 * v + k];
+                render_projection_to_view(&plan->views[view].projection, position_mm, in_view_mm);
+                project(&plan->views[view].projection, position_mm, ndc);
+                seen += in_view_mm[2] > 0 && fabs(ndc[0]) <= 1 && fabs(ndc[1]) <= 1 && fabs(ndc[2]) <= 1;
+            }
+            assert_int_equal(seen, 1);
+        }
+        render_plan_destroy(plan);
+        scene_end(&test);
+    }
+}
+
+/* Oracle: points of the ball itself, thousands of them: all of those before the eye fall in the rectangle,
+ * and those on its rim come near every side that is not the picture's. */
+static void the_rectangle_of_a_ball_holds_it_tightly(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 8 };
+    for (int i = 0; i < 300; i++) {
+        struct render_projection camera = { .is_orthographic = i % 4 == 0, .near_mm = 0.01, .far_mm = 100 };
+        const double forward[3] = { 0.6, 0, -0.8 }, up[3] = { 0, 1, 0 };
+        render_projection_aim(&camera, forward, up);
+        camera.half_height = camera.is_orthographic ? 20 : 0.6;
+        camera.half_width = 1.3 * camera.half_height;
+        double centre_mm[3], rectangle[4], low[2] = { 2, 2 }, high[2] = { -2, -2 };
+        for (int k = 0; k < 3; k++)
+            centre_mm[k] = uniform(&rng, -15, 15);
+        const double radius_mm = log_uniform(&rng, 0.1, 10);
+        const bool is_seen = render_projection_bound_sphere(&camera, centre_mm, radius_mm, rectangle);
+        for (int j = 0; j < 4000; j++) {
+            const double z = uniform(&rng, -1, 1), angle = uniform(&rng, 0, 2 * acos(-1));
+            const double position_mm[3] = { centre_mm[0] + radius_mm * sqrt(1 - z * z) * cos(angle),
+                                            centre_mm[1] + radius_mm * sqrt(1 - z * z) * sin(angle),
+                                            centre_mm[2] + radius_mm * z };
+            double in_view_mm[3];
+            render_projection_to_view(&camera, position_mm, in_view_mm);
+            if (in_view_mm[2] < camera.near_mm)
+                continue;
+            const double w = camera.is_orthographic ? 1 : in_view_mm[2];
+            const double at[2] = { in_view_mm[0] / w / camera.half_width,
+                                   in_view_mm[1] / w / camera.half_height };
+            if (fabs(at[0]) > 1 || fabs(at[1]) > 1)
+                continue;
+            assert_true(is_seen);
+            for (int k = 0; k < 2; k++) {
+                assert_true(at[k] >= rectangle[k] - 1e-9 && at[k] <= rectangle[k + 2] + 1e-9);
+                low[k] = fmin(low[k], at[k]);
+                high[k] = fmax(high[k], at[k]);
+            }
+        }
+        double centre_in_view_mm[3];
+        render_projection_to_view(&camera, centre_mm, centre_in_view_mm);
+        bool is_inside = is_seen && centre_in_view_mm[2] > 2 * radius_mm;
+        for (int k = 0; k < 4; k++)
+            is_inside = is_inside && fabs(rectangle[k]) < 1;
+        for (int k = 0; is_inside && k < 2; k++) {
+            const double size = rectangle[k + 2] - rectangle[k];
+            assert_true(low[k] - rectangle[k] < 0.03 * size && rectangle[k + 2] - high[k] < 0.03 * size);
+        }
+    }
+}
+
+/* Oracle: the samples, one by one: each is in exactly one splat, and the splat's rectangle and depth hold
+ * all that the sample reaches. */
+static void splats_hold_what_their_samples_reach(void **state)
+{
+    (void)state;
+    enum { COUNT = 500 };
+    struct rng rng = { .seed = 4 };
+    static struct render_light_sample rows[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        for (int k = 0; k < 3; k++)
+            rows[i].position_mm[k] = (float)uniform(&rng, -5, 5);
+    }
+    const struct render_light_samples samples = { .samples = rows, .count = COUNT };
+    const struct io_camera camera = {
+        .eye_mm = { 0, 0, 30 }, .up = { 0, 1, 0 }, .fov_y_rad = 1, .width_px = 80, .height_px = 60
+    };
+    const struct render_ball ball = { .radius_mm = 10 };
+    struct render_projection projection;
+    render_projection_of_camera(&camera, &ball, &projection);
+    struct render_splats splats;
+    const double r_max_mm = 2;
+    assert_true(render_splats_create(&samples, &projection, r_max_mm, &splats, NULL));
+    size_t next = 0;
+    for (size_t s = 0; s < splats.count; s++) {
+        const struct render_splat *const splat = &splats.splats[s];
+        assert_int_equal(splat->first, next);
+        next += splat->count;
+        for (size_t i = splat->first; i < next; i++) {
+            double position_mm[3], in_view_mm[3], rectangle[4];
+            for (int k = 0; k < 3; k++)
+                position_mm[k] = (double)rows[i].position_mm[k];
+            assert_true(render_projection_bound_sphere(&projection, position_mm, r_max_mm, rectangle));
+            render_projection_to_view(&projection, position_mm, in_view_mm);
+            assert_true((double)splat->rectangle[0] <= rectangle[0] + 1e-6);
+            assert_true((double)splat->rectangle[1] <= rectangle[1] + 1e-6);
+            assert_true((double)splat->rectangle[2] >= rectangle[2] - 1e-6);
+            assert_true((double)splat->rectangle[3] >= rectangle[3] - 1e-6);
+            assert_true((double)splat->depth <=
+                        render_projection_linear_depth(&projection, in_view_mm[2] - r_max_mm));
+        }
+    }
+    assert_int_equal(next, COUNT);
+    render_splats_destroy(&splats);
+}
+
+/* ---- bad requests ------------------------------------------------------------------------------- */
+
+static void fails_with(const struct render_request *request, const char *message)
+{
+    struct render_plan *plan;
+    dipole_status status = { 0 };
+    assert_false(render_plan_create(request, &plan, &status));
+    assert_null(plan);
+    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
+    assert_string_equal(status.message, message);
+}
+
+/* Oracle: the messages, which must name both objects, and the limits. */
+static void bad_requests_are_told(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    init_sphere(&test);
+    const struct io_material other = skin1();
+    struct render_request request = request_for(&test);
+    request.epsilon = 2;
+    fails_with(&request, "epsilon is 2, expected 1e-05 to 0.5");
+    request.epsilon = NAN;
+    fails_with(&request, "epsilon is nan, expected 1e-05 to 0.5");
+    request.epsilon = 0.01;
+    test.scene.camera.width_px = 16384;
+    test.scene.camera.height_px = 16384;
+    fails_with(&request,
+               "the picture is 16384x16384, expected sides of 1 to 16384 and at most 16777216 pixels");
+    test.scene.camera.width_px = 64;
+    test.scene.camera.height_px = 48;
+    assert_true(scene_add(&test, IO_PRIMITIVE_CUBE, 4, 3, 12, &other));
+    fails_with(&request, "objects \"object 1\" and \"object 2\" are of different media (sigma_a_per_mm in "
+                         "R: 0.0021 and 0.032), expected one material in the whole scene");
+    scene_end(&test);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_effect_is_called_for_by_some_scene_only),
+        cmocka_unit_test(a_dark_scene_needs_no_light_passes),
+        cmocka_unit_test(a_texture_read_before_it_is_written_fails_the_plan),
+        cmocka_unit_test(passes_per_view_are_repeated_together),
+        cmocka_unit_test(every_texture_has_a_row),
+        cmocka_unit_test(the_error_budget_is_kept),
+        cmocka_unit_test(auto_takes_lambert_when_scattering_is_under_a_pixel),
+        cmocka_unit_test(a_light_view_that_is_too_coarse_is_told),
+        cmocka_unit_test(the_callers_table_counts),
+        cmocka_unit_test(bands_add_up),
+        cmocka_unit_test(every_vertex_is_in_a_lights_view),
+        cmocka_unit_test(the_rectangle_of_a_ball_holds_it_tightly),
+        cmocka_unit_test(splats_hold_what_their_samples_reach),
+        cmocka_unit_test(bad_requests_are_told),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

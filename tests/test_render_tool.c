@@ -1,0 +1,282 @@
+/* The program render, as a user runs it: exit codes, exact messages, pictures read back. */
+#include "check.h"
+
+#include "io/exr.h"
+#include "io/image.h"
+
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#define RENDER PROGRAM_FOLDER "/render"
+
+/* Run a shell command in the test's folder; its two outputs. Returns the exit code. */
+static int run(const char *command, char *out, char *err, size_t size)
+{
+    char line[4096];
+    snprintf(line, sizeof line, "{ %s; } >stdout.txt 2>stderr.txt", command);
+    const int code = system(line);
+    assert_true(WIFEXITED(code));
+    const char *const names[2] = { "stdout.txt", "stderr.txt" };
+    char *const texts[2] = { out, err };
+    for (int i = 0; i < 2; i++) {
+        FILE *const file = fopen(names[i], "r");
+        assert_non_null(file);
+        const size_t length = fread(texts[i], 1, size - 1, file);
+        texts[i][length] = '\0';
+        fclose(file);
+    }
+    return WEXITSTATUS(code);
+}
+
+static void write_file(const char *path, const char *text)
+{
+    FILE *const file = fopen(path, "w");
+    assert_non_null(file);
+    assert_true(fputs(text, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
+static const char sphere_json[] =
+    "{ \"camera\": { \"eye\": [0, 0, 30], \"target\": [0, 0, 0], \"fov_y_deg\": 25, \"size\": [64, 48] },\n"
+    "  \"lights\": [{ \"kind\": \"directional\", \"direction\": [0.8, -0.6, -0.3], \"irradiance\": 3 }],\n"
+    "  \"objects\": [{ \"primitive\": \"sphere\", \"detail\": 64, \"transform\": { \"scale\": 5 },\n"
+    "                \"material\": \"skin1\", \"roughness\": 0.4 }] }\n";
+
+static const char two_materials_json[] =
+    "{ \"camera\": { \"eye\": [0, 0, 30], \"target\": [0, 0, 0], \"fov_y_deg\": 25, \"size\": [64, 48] },\n"
+    "  \"lights\": [{ \"kind\": \"directional\", \"direction\": [0.8, -0.6, -0.3], \"irradiance\": 3 }],\n"
+    "  \"objects\": [{ \"name\": \"ball\", \"primitive\": \"sphere\", \"material\": \"skin1\" },\n"
+    "              { \"name\": \"box\", \"primitive\": \"cube\", \"material\": \"marble\" }] }\n";
+
+static int setup(void **state)
+{
+    (void)state;
+    write_file("sphere.json", sphere_json);
+    write_file("two.json", two_materials_json);
+    return system("rm -rf *.exr *.png tables others empty") != 0;
+}
+
+/* The command ends with that code and exactly that line on stderr, and leaves no picture. */
+static void fails_with(const char *command, int code, const char *message)
+{
+    char out[4096], err[4096];
+    const int found = run(command, out, err, sizeof out);
+    if (found != code || strcmp(err, message) != 0)
+        print_error("%s\n  exit %d, stderr: %s", command, found, err);
+    assert_string_equal(err, message);
+    assert_int_equal(found, code);
+    assert_string_equal(out, "");
+    assert_int_equal(system("ls | grep -q '^bad\\.'") != 0, 1);
+}
+
+static struct io_image *read_exr(const char *path)
+{
+    struct io_image *image;
+    dipole_status status;
+    if (!io_exr_read(path, &image, &status))
+        fail_msg("%s", status.message);
+    return image;
+}
+
+static double relative_rmse(const struct io_image *found, const struct io_image *expected)
+{
+    assert_int_equal(found->width_px, expected->width_px);
+    assert_int_equal(found->height_px, expected->height_px);
+    double error2 = 0, value2 = 0;
+    for (size_t i = 0; i < (size_t)found->width_px * (size_t)found->height_px * 4; i++) {
+        const double e = (double)expected->pixels[i], f = (double)found->pixels[i];
+        error2 += (f - e) * (f - e);
+        value2 += e * e;
+    }
+    return sqrt(error2 / value2);
+}
+
+/* Oracle: the promised exit codes and messages; nothing is half-written. */
+static void bad_input_is_one_line_and_no_picture(void **state)
+{
+    (void)state;
+    fails_with(RENDER " absent.json -o bad.exr", 1,
+               "render: absent.json: cannot be read: No such file or directory\n");
+    fails_with(RENDER " sphere.json -o bad.tif", 1,
+               "render: bad.tif: unknown kind of picture, expected a name that ends in .exr or .png\n");
+    fails_with(RENDER " sphere.json -o absent/bad.exr", 1,
+               "render: absent/bad.exr: cannot be written, its folder is missing: No such file or "
+               "directory\n");
+    fails_with(
+        RENDER " two.json -o bad.exr", 1,
+        "render: two.json: objects \"ball\" and \"box\" are of different media (sigma_a_per_mm in R: "
+        "0.032 and 0.0021), expected one material in the whole scene\n");
+    fails_with(RENDER " sphere.json -o bad.exr --size 16384x16384", 1,
+               "render: sphere.json: the picture is 16384x16384, expected sides of 1 to 16384 and at most "
+               "16777216 pixels\n");
+    fails_with(RENDER " sphere.json -o bad.exr --luts absent", 1,
+               "render: absent: cannot list the folder of tables: No such file or directory\n");
+    fails_with("ulimit -f 4; " RENDER " sphere.json -o bad.exr --technique lambert", 1,
+               "render: bad.exr: cannot be written: File too large\n");
+}
+
+/* Oracle: the same for the command line itself. What comes in later versions is unknown now. */
+static void wrong_usage_is_code_2(void **state)
+{
+    (void)state;
+    fails_with(RENDER " sphere.json", 2, "render: no --output (-o) IMG was given; try --help\n");
+    fails_with(RENDER " sphere.json -o bad.exr --technique tsm", 2,
+               "render: --technique is \"tsm\", expected one of auto, splat, lambert\n");
+    fails_with(RENDER " sphere.json -o bad.exr --context glx", 2,
+               "render: --context is \"glx\", expected one of osmesa, egl, window\n");
+    char out[4096], err[4096];
+    assert_int_equal(run(RENDER " sphere.json -o bad.exr --epsilon 0", out, err, sizeof out), 2);
+    assert_int_equal(run(RENDER " sphere.json -o bad.exr --budget-ms 5", out, err, sizeof out), 2);
+    assert_int_equal(run(RENDER " -o bad.exr", out, err, sizeof out), 2);
+}
+
+/* Oracle: the environment, made unfit for each backend: every one tried is named with its reason. */
+static void a_missing_context_names_what_was_tried(void **state)
+{
+    (void)state;
+    fails_with("env -u DISPLAY -u WAYLAND_DISPLAY " RENDER " sphere.json -o bad.exr --context window", 1,
+               "render: no OpenGL 4.5 context could be had: window: glfwInit: X11: The DISPLAY environment "
+               "variable is missing\n");
+    fails_with("MESA_GL_VERSION_OVERRIDE=3.1 " RENDER " sphere.json -o bad.exr", 1,
+               "render: no OpenGL 4.5 context could be had: osmesa: OSMesaCreateContextAttribs gave no 4.5 "
+               "core context; egl: eglCreateContext (4.5 core) failed with EGL error 0x3009\n");
+}
+
+/* Oracle: the JSON that was promised, and the attributes of the picture read back. */
+static void results_are_told_as_promised(void **state)
+{
+    (void)state;
+    char out[16384], err[4096];
+    assert_int_equal(run(RENDER " sphere.json -o a.exr --json --epsilon 0.02", out, err, sizeof err), 0);
+    assert_string_equal(err, "");
+    json_t *const result = json_loads(out, 0, NULL);
+    assert_non_null(result);
+    assert_string_equal(json_string_value(json_object_get(result, "technique")), "splat");
+    assert_string_equal(json_string_value(json_object_get(result, "image")), "a.exr");
+    assert_close(json_real_value(json_object_get(result, "epsilon")), 0.02, 0, "epsilon");
+    assert_true(json_real_value(json_object_get(result, "total_ms")) > 0);
+    const json_t *const effects = json_object_get(result, "effects");
+    assert_int_equal(json_array_size(effects), 9);
+    for (size_t i = 0; i < json_array_size(effects); i++) {
+        const json_t *const effect = json_array_get(effects, i);
+        assert_true(json_is_string(json_object_get(effect, "name")));
+        assert_true(json_is_boolean(json_object_get(effect, "active")));
+        assert_true(json_is_string(json_object_get(effect, "reason")));
+        assert_true(json_is_real(json_object_get(effect, "ms")));
+    }
+    json_decref(result);
+    struct io_image *const image = read_exr("a.exr");
+    assert_int_equal(image->width_px, 64);
+    assert_int_equal(image->height_px, 48);
+    assert_int_equal(image->channel_count, 4);
+    assert_string_equal(io_image_find(image, "dipole:technique")->text, "splat");
+    assert_string_equal(io_image_find(image, "dipole:version")->text, DIPOLE_VERSION);
+    assert_close(io_image_find(image, "dipole:epsilon")->numbers[0], 0.02, 0, "attribute");
+    io_image_destroy(image);
+    assert_int_equal(
+        run(RENDER " sphere.json -o b.exr --explain --size 32x24 -t lambert", out, err, sizeof err), 0);
+    assert_non_null(strstr(out, "technique lambert, epsilon 0.01\n"));
+    assert_non_null(strstr(out, "splat           no            0.0  technique is lambert\n"));
+    assert_non_null(strstr(out, "b.exr: lambert, epsilon 0.01, "));
+}
+
+/* Oracle: the linear picture, tone mapped and encoded by hand. */
+static void the_png_is_the_tone_mapped_exr(void **state)
+{
+    (void)state;
+    char out[4096], err[4096];
+    assert_int_equal(
+        run(RENDER " sphere.json -o a.exr && " RENDER " sphere.json -o a.png", out, err, sizeof out), 0);
+    struct io_image *const linear = read_exr("a.exr");
+    struct io_image *png;
+    assert_true(io_photo_read("a.png", &png, NULL));
+    size_t count = 0;
+    for (size_t i = 0; i < 64 * 48; i++) {
+        const float *const rgb = linear->pixels + 4 * i;
+        if (fmaxf(fmaxf(rgb[0], rgb[1]), rgb[2]) > 0.59f)
+            continue;
+        for (size_t c = 0; c < 3; c++) {
+            const double found = (double)png->pixels[(size_t)png->channel_count * i + c];
+            /* Half a step of 8 bits: the curve's slope is at most 12.92, at least 0.9 of linear. */
+            assert_true(fabs(found - (double)rgb[c]) < 0.6 / 255 * 2.5);
+            count += rgb[c] > 0;
+        }
+    }
+    assert_true(count > 500);
+    io_image_destroy(linear);
+    io_image_destroy(png);
+}
+
+/* Oracle: the picture with a table baked in memory. A table of other coefficients under the right name is
+ * refused, and so is a folder without one. */
+static void tables_on_disk_are_found_by_their_medium(void **state)
+{
+    (void)state;
+    char out[4096], err[4096];
+    write_file("skin1.json", "{ \"name\": \"Skin 1\", \"eta\": 1.3, \"sigma_a_per_mm\": [0.1, 0.2, 0.3],\n"
+                             "  \"sigma_s_prime_per_mm\": [1, 1, 1] }\n");
+    assert_int_equal(mkdir("empty", 0777), 0);
+    assert_int_equal(run("m=" PROGRAM_FOLDER "/../share/libdipole/materials; " PROGRAM_FOLDER
+                         "/lutgen $m/marble.json $m/skin1.json -o tables && " PROGRAM_FOLDER
+                         "/lutgen skin1.json -o others",
+                         out, err, sizeof out),
+                     0);
+    assert_int_equal(run(RENDER " sphere.json -o memory.exr && " RENDER
+                                " sphere.json -o disk.exr --luts tables",
+                         out, err, sizeof out),
+                     0);
+    assert_string_equal(err, "");
+    struct io_image *const memory = read_exr("memory.exr"), *const disk = read_exr("disk.exr");
+    assert_true(relative_rmse(disk, memory) < 1e-6);
+    io_image_destroy(memory);
+    io_image_destroy(disk);
+    fails_with(
+        RENDER " sphere.json -o bad.exr --luts empty", 1,
+        "render: empty: no table of material \"Skin 1\" among 0 *.splat1d.exr; bake one with lutgen\n");
+    fails_with(RENDER " sphere.json -o bad.exr --luts others", 1,
+               "render: others/skin1.splat1d.exr: the table is of another medium than material \"Skin 1\": "
+               "its sigma_a_per_mm in R is 0.1, the scene's 0.032\n");
+}
+
+/* Oracle: each other. OSMesa, EGL and a hidden window give one picture. */
+static void all_contexts_give_the_same_picture(void **state)
+{
+    (void)state;
+    char out[4096], err[4096];
+    assert_int_equal(run(RENDER " sphere.json -o osmesa.exr --context osmesa && " RENDER
+                                " sphere.json -o egl.exr --context egl",
+                         out, err, sizeof out),
+                     0);
+    struct io_image *const osmesa = read_exr("osmesa.exr"), *const egl = read_exr("egl.exr");
+    assert_true(relative_rmse(egl, osmesa) < 1e-4);
+    io_image_destroy(egl);
+    if (system("command -v xvfb-run >/dev/null") == 0) {
+        assert_int_equal(
+            run("xvfb-run -a " RENDER " sphere.json -o window.exr --context window", out, err, sizeof out),
+            0);
+        struct io_image *const window = read_exr("window.exr");
+        assert_true(relative_rmse(window, osmesa) < 1e-4);
+        io_image_destroy(window);
+    } else {
+        print_message("  no xvfb-run: the window was not tried\n");
+    }
+    io_image_destroy(osmesa);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(bad_input_is_one_line_and_no_picture, setup),
+        cmocka_unit_test_setup(wrong_usage_is_code_2, setup),
+        cmocka_unit_test_setup(a_missing_context_names_what_was_tried, setup),
+        cmocka_unit_test_setup(results_are_told_as_promised, setup),
+        cmocka_unit_test_setup(the_png_is_the_tone_mapped_exr, setup),
+        cmocka_unit_test_setup(tables_on_disk_are_found_by_their_medium, setup),
+        cmocka_unit_test_setup(all_contexts_give_the_same_picture, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
