@@ -16,8 +16,6 @@
 #include <time.h>
 #include <unistd.h>
 
-extern char **environ;
-
 /* ---- meshes in memory ---------------------------------------------------------------------------- */
 
 struct io_mesh *io_mesh_create(size_t vertex_count, size_t triangle_count)
@@ -203,7 +201,7 @@ static bool import(const struct io_mesh_importer *importer, const char *path, in
 {
     const dipole_place place = { .source = path };
     const int64_t deadline_ms = now_ms() + (int64_t)importer->seconds_limit * 1000;
-    int pipe, outcome = 0;
+    int pipe = -1, outcome = 0;
     pid_t process;
     const int error = spawn(importer, path, file, &pipe, &process);
     if (error != 0)

@@ -216,7 +216,7 @@ static void sum_normals(const struct io_mesh_soup *soup, const uint32_t *ids, st
  * a sheet of two faces back to back, that of a triangle. */
 static bool fill_normals(struct io_mesh_soup *soup, const uint32_t *ids, size_t id_count)
 {
-    struct vector *sums = calloc(id_count, sizeof *sums);
+    struct vector *sums = calloc(id_count + 1, sizeof *sums); /* 0 would be no memory */
     if (!sums)
         return false;
     sum_normals(soup, ids, sums);

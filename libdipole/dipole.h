@@ -66,6 +66,10 @@ typedef struct dipole_place {
 DIPOLE_API bool dipole_fail(dipole_status *status, dipole_code code, const dipole_place *place,
                             const char *format, ...) DIPOLE_PRINTF(4, 5);
 
+#ifdef __clang_analyzer__ /* which cannot see that the result is always false */
+#define dipole_fail(...) (dipole_fail(__VA_ARGS__), false)
+#endif
+
 /* Version of the library that is linked: "major.minor.patch". */
 DIPOLE_API const char *dipole_version(void);
 

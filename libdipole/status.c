@@ -8,8 +8,8 @@ const char *dipole_version(void)
     return DIPOLE_VERSION;
 }
 
-bool dipole_fail(dipole_status *status, dipole_code code, const dipole_place *place, const char *format,
-                 ...)
+bool(dipole_fail)(dipole_status *status, dipole_code code, const dipole_place *place, const char *format,
+                  ...)
 {
     if (status == NULL)
         return false;
