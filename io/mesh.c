@@ -202,7 +202,7 @@ static bool import(const struct io_mesh_importer *importer, const char *path, in
     const dipole_place place = { .source = path };
     const int64_t deadline_ms = now_ms() + (int64_t)importer->seconds_limit * 1000;
     int pipe = -1, outcome = 0;
-    pid_t process;
+    pid_t process = 0;
     const int error = spawn(importer, path, file, &pipe, &process);
     if (error != 0)
         return dipole_fail(status, DIPOLE_NOT_FOUND, &place,
