@@ -8,6 +8,7 @@ enum { RADIUS_COUNT = 4096, REPEAT_COUNT = 200 };
 
 static double radii_mm[RADIUS_COUNT];
 static dipole_coefficients coefficients;
+static dipole_stack *half_space, *layers;
 
 static double exp_twice(double r_mm)
 {
@@ -44,6 +45,23 @@ static double fdr(double r_mm)
     return dipole_fdr_exact(1.3 + 1e-3 * r_mm);
 }
 
+static double stack_profile(const dipole_stack *stack, double r_mm)
+{
+    double value;
+    dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, &r_mm, 1, &value);
+    return value;
+}
+
+static double beam(double r_mm)
+{
+    return stack_profile(half_space, r_mm);
+}
+
+static double beam_layers(double r_mm)
+{
+    return stack_profile(layers, r_mm);
+}
+
 /* Shortest of REPEAT_COUNT passes over the radii, in ns per call. */
 static double measure_ns(double (*function)(double), int call_count, volatile double *sink)
 {
@@ -73,11 +91,17 @@ int main(void)
         { "tail(r)", tail, RADIUS_COUNT },
         { "r_max(epsilon)", r_max, 64 },
         { "Fdr(eta), exact", fdr, 64 },
+        { "R(r), beam model, half-space", beam, 256 },
+        { "R(r), beam model, two layers", beam_layers, 256 },
     };
     const dipole_medium marble_green = { .sigma_a_per_mm = 0.0041,
                                          .sigma_s_prime_per_mm = 2.62,
                                          .eta = 1.5 };
-    if (!dipole_coefficients_init(&marble_green, &coefficients, NULL))
+    const dipole_layer stack[2] = { { marble_green, 1.0 },
+                                    { { 0.0021, 2.19, 1.5, DIPOLE_FDR_EXACT }, INFINITY } };
+    if (!dipole_coefficients_init(&marble_green, &coefficients, NULL) ||
+        !dipole_stack_create(stack + 1, 1, DIPOLE_MODEL_BEAM, &half_space, NULL) ||
+        !dipole_stack_create(stack, 2, DIPOLE_MODEL_BEAM, &layers, NULL))
         return EXIT_FAILED;
     for (int i = 0; i < RADIUS_COUNT; i++)
         radii_mm[i] = 20.0 * i / RADIUS_COUNT;
@@ -89,5 +113,7 @@ int main(void)
         unit_ns = i == 0 ? ns : unit_ns;
         printf("| %s | %.1f | %.1f |\n", rows[i].name, ns, ns / unit_ns);
     }
+    dipole_stack_destroy(half_space);
+    dipole_stack_destroy(layers);
     return EXIT_DONE;
 }

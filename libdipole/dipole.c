@@ -71,7 +71,7 @@ static bool is_distance(double r_mm)
 
 /* z (sigma_tr + 1/d) e^(-sigma_tr d) / d^2, in an order in which no factor overflows; the exponential is
  * split in two, so that it does not underflow before a large 1/d^2 has been multiplied in. */
-static double lobe(double z_mm, double sigma_tr_per_mm, double r_mm)
+double dipole_lobe(double z_mm, double sigma_tr_per_mm, double r_mm)
 {
     const double d = hypot(r_mm, z_mm), x = sigma_tr_per_mm * d;
     if (!(x < 2000.0) || isinf(d))
@@ -85,7 +85,8 @@ double dipole_rd_per_mm2(const dipole_coefficients *c, double r_mm)
     if (!is_distance(r_mm))
         return NAN;
     return c->alpha_prime / (4.0 * PI) *
-           (lobe(c->z_r_mm, c->sigma_tr_per_mm, r_mm) + lobe(c->z_v_mm, c->sigma_tr_per_mm, r_mm));
+           (dipole_lobe(c->z_r_mm, c->sigma_tr_per_mm, r_mm) +
+            dipole_lobe(c->z_v_mm, c->sigma_tr_per_mm, r_mm));
 }
 
 /* ---- integrals (T6, T7, T8) ----------------------------------------------------------------------- */
@@ -96,18 +97,12 @@ double dipole_diffuse_reflectance(const dipole_coefficients *c)
            (exp(-c->sigma_tr_per_mm * c->z_r_mm) + exp(-c->sigma_tr_per_mm * c->z_v_mm));
 }
 
-/* (1 - e^(-x)) / x, 1 at x = 0. */
-static double decay_mean(double x)
-{
-    return x > 0.0 ? -expm1(-x) / x : 1.0;
-}
-
 /*
  * Mean of 2 * lobe over a ring. The antiderivative z e^(-sigma d)/d is differenced by hand:
  *   z e^(-s d_lo)/d_lo - z e^(-s d_hi)/d_hi = z e^(-s d_lo)/d_hi [D/d_lo + 1 - e^(-s D)],  D = d_hi - d_lo,
  * and the ring's area is pi D (d_hi + d_lo), so that D divides out and nothing cancels however thin it is.
  */
-static double lobe_ring_mean(double z_mm, double sigma_tr_per_mm, double r_lo_mm, double r_hi_mm)
+double dipole_lobe_ring_mean(double z_mm, double sigma_tr_per_mm, double r_lo_mm, double r_hi_mm)
 {
     const double d_lo = hypot(r_lo_mm, z_mm), d_hi = hypot(r_hi_mm, z_mm);
     if (isinf(d_hi) || !(sigma_tr_per_mm * d_lo < 2000.0))
@@ -123,12 +118,12 @@ double dipole_rd_ring_mean_per_mm2(const dipole_coefficients *c, double r_lo_mm,
     if (!(is_distance(r_lo_mm) && r_hi_mm >= r_lo_mm))
         return NAN;
     return c->alpha_prime / (4.0 * PI) *
-           (lobe_ring_mean(c->z_r_mm, c->sigma_tr_per_mm, r_lo_mm, r_hi_mm) +
-            lobe_ring_mean(c->z_v_mm, c->sigma_tr_per_mm, r_lo_mm, r_hi_mm));
+           (dipole_lobe_ring_mean(c->z_r_mm, c->sigma_tr_per_mm, r_lo_mm, r_hi_mm) +
+            dipole_lobe_ring_mean(c->z_v_mm, c->sigma_tr_per_mm, r_lo_mm, r_hi_mm));
 }
 
 /* 1 - (z/d) e^(-sigma_tr (d - z)) as a sum of two positive terms: the part of one lobe within r. */
-static double lobe_within(double z_mm, double sigma_tr_per_mm, double r_mm)
+double dipole_lobe_within(double z_mm, double sigma_tr_per_mm, double r_mm)
 {
     const double d = hypot(r_mm, z_mm);
     if (isinf(d))
@@ -143,12 +138,12 @@ double dipole_reflectance_within(const dipole_coefficients *c, double r_mm)
         return NAN;
     const double s = c->sigma_tr_per_mm;
     return 0.5 * c->alpha_prime *
-           (exp(-s * c->z_r_mm) * lobe_within(c->z_r_mm, s, r_mm) +
-            exp(-s * c->z_v_mm) * lobe_within(c->z_v_mm, s, r_mm));
+           (exp(-s * c->z_r_mm) * dipole_lobe_within(c->z_r_mm, s, r_mm) +
+            exp(-s * c->z_v_mm) * dipole_lobe_within(c->z_v_mm, s, r_mm));
 }
 
 /* (z/d) e^(-sigma_tr (d - z)): the part of one lobe beyond r. */
-static double lobe_tail(double z_mm, double sigma_tr_per_mm, double r_mm)
+double dipole_lobe_tail(double z_mm, double sigma_tr_per_mm, double r_mm)
 {
     const double d = hypot(r_mm, z_mm);
     return isinf(d) ? 0.0 : (z_mm / d) * exp(-sigma_tr_per_mm * path_excess_mm(z_mm, r_mm));
@@ -160,7 +155,7 @@ double dipole_tail_fraction(const dipole_coefficients *c, double r_mm)
     if (!is_distance(r_mm))
         return NAN;
     const double s = c->sigma_tr_per_mm, virtual_weight = exp(-s * source_separation_mm(c));
-    return (lobe_tail(c->z_r_mm, s, r_mm) + virtual_weight * lobe_tail(c->z_v_mm, s, r_mm)) /
+    return (dipole_lobe_tail(c->z_r_mm, s, r_mm) + virtual_weight * dipole_lobe_tail(c->z_v_mm, s, r_mm)) /
            (1.0 + virtual_weight);
 }
 
@@ -181,11 +176,7 @@ double dipole_spectrum(const dipole_coefficients *c, double k_per_mm)
  *   dg / d log z         = (z/d^3) e^(-x) [(x + 1) - (z/d)^2 (x^2 + 3x + 3)]
  *   dg / d (sigma_tr^2)  = -(z/d) e^(-x) / 2, finite at sigma_tr = 0
  */
-struct lobe_gradient {
-    double value, d_log_z, d_sigma_tr2;
-};
-
-static struct lobe_gradient lobe_differentiate(double z_mm, double sigma_tr_per_mm, double r_mm)
+struct lobe_gradient dipole_lobe_differentiate(double z_mm, double sigma_tr_per_mm, double r_mm)
 {
     const double d = hypot(r_mm, z_mm), x = sigma_tr_per_mm * d;
     if (!(x < 2000.0) || isinf(d))
@@ -215,8 +206,8 @@ dipole_derivative dipole_rd_derivative(const dipole_coefficients *c, double r_mm
 {
     if (!is_distance(r_mm))
         return (dipole_derivative){ NAN, NAN };
-    const struct lobe_gradient real = lobe_differentiate(c->z_r_mm, c->sigma_tr_per_mm, r_mm);
-    const struct lobe_gradient virtual = lobe_differentiate(c->z_v_mm, c->sigma_tr_per_mm, r_mm);
+    const struct lobe_gradient real = dipole_lobe_differentiate(c->z_r_mm, c->sigma_tr_per_mm, r_mm);
+    const struct lobe_gradient virtual = dipole_lobe_differentiate(c->z_v_mm, c->sigma_tr_per_mm, r_mm);
     const double value = real.value + virtual.value;
     const double d_log_z = real.d_log_z + virtual.d_log_z;
     const double d_sigma_tr2 = real.d_sigma_tr2 + virtual.d_sigma_tr2;

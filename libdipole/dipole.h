@@ -119,6 +119,9 @@ DIPOLE_API double dipole_fdt_outside(double eta);
 /* Legal ranges. Coefficients are 0 or in [MIN, MAX]; distances in [0, MAX]. */
 #define DIPOLE_SIGMA_MIN_PER_MM 1e-50
 #define DIPOLE_SIGMA_MAX_PER_MM 1e50
+#define DIPOLE_THICKNESS_MIN_MM 1e-50
+#define DIPOLE_THICKNESS_MAX_MM 1e50
+#define DIPOLE_EPSILON_MIN 1e-100
 #define DIPOLE_ETA_MIN 0.1
 #define DIPOLE_ETA_MAX 10.0
 
@@ -207,6 +210,91 @@ DIPOLE_API double dipole_spectrum(const dipole_coefficients *coefficients, doubl
  * total: 4 spectrum(2 pi / h) = epsilon spectrum(0). theory.md T11. epsilon 1e-100 to below 4; NaN outside.
  * Like r_max it does not depend on alpha' otherwise, so it is defined at sigma_s' = 0. */
 DIPOLE_API double dipole_splat_spacing_mm(const dipole_coefficients *coefficients, double epsilon);
+
+/* ---- layers and models -------------------------------------------------------------------------- */
+
+/* How light spreads under the surface. */
+typedef enum dipole_model {
+    DIPOLE_MODEL_DIPOLE = 0,    /* Jensen et al. 2001; a half-space; T5                              */
+    DIPOLE_MODEL_BETTER_DIPOLE, /* d'Eon 2012; a half-space; T24                                     */
+    DIPOLE_MODEL_MULTIPOLE,     /* Donner and Jensen 2005; layers thicker than one mean free path; T25 */
+    DIPOLE_MODEL_BEAM,          /* extended source, partial-current boundary; any layers; T16, T17   */
+} dipole_model;
+
+/* One layer, top first. thickness_mm: 1e-50 to 1e50, or INFINITY for the last (a half-space). */
+typedef struct dipole_layer {
+    dipole_medium medium;
+    double thickness_mm;
+} dipole_layer;
+
+enum { DIPOLE_LAYER_LIMIT = 16 };
+
+/* Where light leaves: through the face it entered, or the other. */
+typedef enum dipole_face { DIPOLE_FACE_LIT = 0, DIPOLE_FACE_FAR } dipole_face;
+
+/* A stack of layers in one colour channel, immutable: any number of threads may use one. */
+typedef struct dipole_stack dipole_stack;
+
+/*
+ * Prepare count (1 to DIPOLE_LAYER_LIMIT) layers, light entering the first at normal incidence.
+ * The caller owns *stack_out and ends it with dipole_stack_destroy(). Fails with DIPOLE_BAD_VALUE (naming
+ * layer, field, value and range), DIPOLE_NOT_SUPPORTED (the model cannot do these layers) or
+ * DIPOLE_OUT_OF_MEMORY; *stack_out is then NULL.
+ */
+DIPOLE_API DIPOLE_CHECKED bool dipole_stack_create(const dipole_layer *layers, size_t count,
+                                                   dipole_model model, dipole_stack **stack_out,
+                                                   dipole_status *status);
+DIPOLE_API void dipole_stack_destroy(dipole_stack *stack);
+
+/* What layer was given, and what was derived from it; index below the count. */
+DIPOLE_API const dipole_layer *dipole_stack_layer(const dipole_stack *stack, size_t index);
+DIPOLE_API const dipole_coefficients *dipole_stack_coefficients(const dipole_stack *stack, size_t index);
+DIPOLE_API size_t dipole_stack_layer_count(const dipole_stack *stack);
+
+/* Part of the light that entered which leaves by a face after scattering, 0 to 1; the far face of a
+ * half-space has 0. theory.md T6, T22 to T25. */
+DIPOLE_API double dipole_stack_total(const dipole_stack *stack, dipole_face face);
+
+/* Part that leaves without scattering, straight through or mirrored inside. Beam model only, else 0. T23 */
+DIPOLE_API double dipole_stack_unscattered(const dipole_stack *stack, dipole_face face);
+
+/* Spatial spectrum at k_per_mm (rad/mm, >= 0), the total at 0. T10, T22 to T25. */
+DIPOLE_API double dipole_stack_spectrum(const dipole_stack *stack, dipole_face face, double k_per_mm);
+
+/*
+ * Profile: power leaving per mm^2 at each of count radii, for one unit of power entering, in 1/mm^2.
+ *
+ *   r_mm     distances, >= 0; values is count doubles, NaN where r_mm is negative or NaN
+ *   Relative error below 1e-9; of light through layers that let less than 1e-6 of it through, more: the
+ * error is below 1e-15 of what a layer one mean free path thick would let through. The beam model has an
+ * integrable logarithm at r = 0: below 1e-9 mean free paths of the thinnest-scattering layer the value
+ * there is continued.
+ */
+DIPOLE_API void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face,
+                                             const double *r_mm, size_t count, double *values);
+
+/* Mean of the profile over the ring r_lo_mm..r_hi_mm, in 1/mm^2; the profile itself where they are equal.
+ */
+DIPOLE_API double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face face,
+                                                 double r_lo_mm, double r_hi_mm);
+
+/* Power leaving within and beyond r_mm, 0 to the total; neither loses digits where it is small. */
+DIPOLE_API double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r_mm);
+DIPOLE_API double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r_mm);
+
+/* Radius beyond which a part epsilon (1e-100 to below 1) of what the face sends out leaves. T9 */
+DIPOLE_API double dipole_stack_r_max_mm(const dipole_stack *stack, dipole_face face, double epsilon);
+
+/* Derivatives with respect to the logarithms of one layer's parameters. */
+typedef struct dipole_stack_gradient {
+    double d_log_sigma_a, d_log_sigma_s_prime, d_log_thickness;
+} dipole_stack_gradient;
+
+DIPOLE_API dipole_stack_gradient dipole_stack_total_gradient(const dipole_stack *stack, dipole_face face,
+                                                             size_t layer);
+DIPOLE_API void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, size_t layer,
+                                              const double *r_mm, size_t count,
+                                              dipole_stack_gradient *gradients);
 
 #ifdef __cplusplus
 }

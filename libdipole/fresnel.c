@@ -50,7 +50,8 @@ static const double legendre[8][2] = {
 };
 
 struct moments {
-    double reflected, transmitted; /* 2 int F mu dmu and 2 int (1 - F) mu dmu; their sum is 1 */
+    double reflected, transmitted; /* 2 int F mu dmu and 2 int (1 - F) mu dmu; their sum is 1      */
+    double thin, dense;            /* 2 int F mu mu' dmu, mu' the cosine on the thin, dense side   */
 };
 
 /*
@@ -67,21 +68,25 @@ static struct moments moments_thin_to_dense(double step, double s_0)
     const double x2 = 1.0 + step, length = -log(s_0);
     const int panel_count = (int)fmax(4.0, ceil(length));
     const double half = 0.5 * length / panel_count;
-    struct moments sum = { 0.0, 0.0 };
+    struct moments sum = { 0.0, 0.0, 0.0, 0.0 };
     for (int panel = 0; panel < panel_count; panel++) {
         const double middle = (2 * panel + 1) * half;
         for (int node = 0; node < 16; node++) {
             const double *const rule = legendre[node / 2];
             const double v = middle + (node % 2 == 0 ? half : -half) * rule[0];
-            const double s = exp(-v), denominator = (x2 + 1.0) - s * step;
+            const double s_root = exp(-0.5 * v), s = s_root * s_root, denominator = (x2 + 1.0) - s * step;
             const double r_p = (step - s * (x2 + 1.0)) / denominator;
-            const double one_minus_s2 = -expm1(-2.0 * v);
+            const double one_minus_s = -expm1(-v), one_minus_s2 = one_minus_s * (1.0 + s);
             const double reflected = 0.5 * (s * s + r_p * r_p);
             const double transmitted = 0.5 * one_minus_s2 * (1.0 + 4.0 * x2 / square(denominator));
             /* 2 mu dmu = (x^2 - 1)/4 (1/s^2 - 1) ds, and ds = s dv */
             const double weight = rule[1] * half * 0.25 * step * one_minus_s2 / s;
             sum.reflected += weight * reflected;
             sum.transmitted += weight * transmitted;
+            /* mu = sqrt(x^2 - 1) (1 - s)/(2 sqrt(s)) on the thin side, and with a plus over x on the dense
+             */
+            sum.thin += weight * reflected * sqrt(step) * (0.5 * one_minus_s / s_root);
+            sum.dense += weight * reflected * sqrt(step / x2) * (0.5 * (1.0 + s) / s_root);
         }
     }
     return sum;
@@ -97,14 +102,15 @@ static bool eta_is_legal(double eta)
 static struct moments moments_inside(double eta)
 {
     if (!eta_is_legal(eta))
-        return (struct moments){ NAN, NAN };
+        return (struct moments){ NAN, NAN, NAN, NAN };
     if (eta == 1.0)
-        return (struct moments){ 0.0, 1.0 };
+        return (struct moments){ 0.0, 1.0, 0.0, 0.0 };
     const double eta2 = eta * eta;
     if (eta > 1.0) {
         const double step = (eta - 1.0) * (eta + 1.0);
         const struct moments outside = moments_thin_to_dense(step, (eta - 1.0) / (eta + 1.0));
-        return (struct moments){ (step + outside.reflected) / eta2, outside.transmitted / eta2 };
+        return (struct moments){ (step + outside.reflected) / eta2, outside.transmitted / eta2,
+                                 outside.thin / eta2, outside.dense / eta2 };
     }
     return moments_thin_to_dense((1.0 - eta) * (1.0 + eta) / eta2, (1.0 - eta) / (1.0 + eta));
 }
@@ -122,6 +128,16 @@ double dipole_fdt_exact(double eta)
 double dipole_fdt_outside(double eta)
 {
     return eta * eta * moments_inside(eta).transmitted;
+}
+
+/* int_0^1 F(mu) mu^2 dmu for light inside; total reflection from the critical angle on adds its own. T24 */
+double dipole_fresnel_second_moment_inside(double eta)
+{
+    const struct moments moments = moments_inside(eta);
+    if (!(eta > 1.0))
+        return 0.5 * moments.thin;
+    const double critical = sqrt((eta - 1.0) * (eta + 1.0)) / eta;
+    return 0.5 * moments.dense + critical * critical * critical / 3.0;
 }
 
 /* ---- the fit (T3) --------------------------------------------------------------------------------- */

@@ -2,8 +2,10 @@
 #ifndef LIBDIPOLE_INTERNAL_H
 #define LIBDIPOLE_INTERNAL_H
 
+#include "dual.h"
 #include "libdipole/dipole.h"
 
+#include <complex.h>
 #include <math.h>
 
 #define PI 3.14159265358979323846
@@ -24,5 +26,114 @@ static inline double path_excess_mm(double z_mm, double r_mm)
 {
     return r_mm * (r_mm / (hypot(z_mm, r_mm) + z_mm));
 }
+
+/* (1 - e^(-x)) / x for x >= 0, 1 at x = 0. */
+static inline double decay_mean(double x)
+{
+    return x > 0.0 ? -expm1(-x) / x : 1.0;
+}
+
+/* C_2 = int_0^1 F(mu) mu^2 dmu for light inside (fresnel.c). T24 */
+double dipole_fresnel_second_moment_inside(double eta);
+
+/* ---- lobes: what one source at depth z sends out of a half-space with phi = 0 at its surface ------- */
+
+/* z (sigma_tr + 1/d) e^(-sigma_tr d) / d^2, d = hypot(r, z). T5 */
+double dipole_lobe(double z_mm, double sigma_tr_per_mm, double r_mm);
+/* Mean of the lobe over a ring. T7 */
+double dipole_lobe_ring_mean(double z_mm, double sigma_tr_per_mm, double r_lo_mm, double r_hi_mm);
+/* 1 - (z/d) e^(-sigma_tr (d - z)), of which e^(-sigma_tr z) times is the part within r. T7 */
+double dipole_lobe_within(double z_mm, double sigma_tr_per_mm, double r_mm);
+/* (z/d) e^(-sigma_tr (d - z)), of which e^(-sigma_tr z) times is the part beyond r. T8 */
+double dipole_lobe_tail(double z_mm, double sigma_tr_per_mm, double r_mm);
+
+/* The lobe and how it answers to its two parameters. T12 */
+struct lobe_gradient {
+    double value, d_log_z, d_sigma_tr2;
+};
+struct lobe_gradient dipole_lobe_differentiate(double z_mm, double sigma_tr_per_mm, double r_mm);
+
+/* ---- one spatial frequency of a stack (layers.c) -------------------------------------------------- */
+
+struct slab {
+    struct dual sigma_s_prime, sigma_t_prime, diffusion, sigma_tr2, thickness;
+    struct dual down, up; /* beams entering from above and from below, per unit that entered the stack */
+    struct dual through;  /* e^(-sigma_t' thickness)                                                  */
+};
+
+struct system {
+    struct slab slabs[DIPOLE_LAYER_LIMIT];
+    double eta[DIPOLE_LAYER_LIMIT];
+    double a_top, a_bottom;
+    size_t count;
+    bool is_half_space;
+    struct dual unscattered[2]; /* of the beam, by dipole_face */
+};
+
+/* parameter: 3 * layer + 0, 1, 2 for d/d log sigma_a, sigma_s', thickness; negative for none. */
+void dipole_system_init(struct system *system, const dipole_layer *layers,
+                        const dipole_coefficients *coefficients, size_t count, int parameter);
+/* R^ and T^ at k^2, complex, by dipole_face: the beam model. T23 */
+void dipole_system_solve(const struct system *system, double complex k2, struct dual out[2]);
+/* The smallest kappa where R^ and T^ are singular at k^2 = -kappa^2; sigma_tr of the base at most. */
+double dipole_system_first_singularity_per_mm(const struct system *system);
+
+/* ---- the papers' models at one spatial frequency (models.c) --------------------------------------- */
+
+/* d'Eon's better dipole; a half-space. T24 */
+void dipole_better_dipole_solve(const struct system *system, double complex k2, struct dual out[2]);
+/* Donner and Jensen's multipole and their combination of layers. T25 */
+void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2]);
+
+/* ---- inverse Hankel transforms (hankel.c) --------------------------------------------------------- */
+
+/* A contour for ever larger singularity x r: the farther out, the closer it must pass. */
+struct hankel_contour {
+    double kappa_r_min; /* smallest singularity x r it serves */
+    double angle, step;
+    size_t first, count; /* its nodes */
+};
+
+/* (1/2 pi) int F(k) J_0(kr) k dk = sum_j Im [weight_j F(-kappa_j^2) kernel(kappa_j, r)] over a range of
+ * nodes. */
+struct hankel_node {
+    double complex kappa, weight;
+};
+
+struct hankel_range {
+    size_t first, count;
+};
+
+enum { HANKEL_CONTOURS = 5 };
+
+struct hankel {
+    double singularity_per_mm, log_start;
+    struct hankel_contour contours[HANKEL_CONTOURS];
+    size_t node_count;
+    struct hankel_node *nodes;
+};
+
+/* Lay out contours for radii from r_min_mm, for F singular from singularity_per_mm on; returns how many
+ * nodes dipole_hankel_fill() needs. longest_mm: longest length in F. */
+size_t dipole_hankel_plan(struct hankel *hankel, double singularity_per_mm, double r_min_mm,
+                          double longest_mm);
+void dipole_hankel_fill(struct hankel *hankel, struct hankel_node *nodes);
+/* The nodes that matter for the profile at a radius and the power beyond it; those for the power within. */
+struct hankel_range dipole_hankel_range_for(const struct hankel *hankel, double r_mm);
+struct hankel_range dipole_hankel_range_all(const struct hankel *hankel);
+/* Part of the total that the beyond kernel misses at the start of the ray. */
+double dipole_hankel_start_share(const struct hankel *hankel);
+/* Kernels: of the profile, and of its integrals over the plane beyond r and within r. */
+double complex dipole_hankel_profile_kernel(double complex kappa, double r_mm);
+double complex dipole_hankel_beyond_kernel(double complex kappa, double r_mm);
+double complex dipole_hankel_within_kernel(double complex kappa, double r_mm);
+
+/* ---- Bessel functions (bessel.c) ------------------------------------------------------------------ */
+
+/* e^z K_0(z) and e^z K_1(z) for |arg z| <= pi/2, z not 0; relative error below 2e-14 to pi/4. */
+struct bessel_k {
+    double complex k0, k1;
+};
+struct bessel_k dipole_bessel_k_scaled(double complex z);
 
 #endif

@@ -1,8 +1,6 @@
 /* How far the light reaches and how densely it must be sampled. docs/theory.md T9, T11. */
 #include "internal.h"
 
-#define EPSILON_MIN 1e-100
-
 /* A falling function of x > 0 and its derivative with respect to log x. */
 typedef void falling_function(const void *context, double x, double *value, double *d_log_x);
 
@@ -62,7 +60,7 @@ static void reach_function(const void *context, double r_mm, double *value, doub
 
 double dipole_r_max_mm(const dipole_coefficients *c, double epsilon)
 {
-    if (!(epsilon >= EPSILON_MIN && epsilon < 1.0))
+    if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 1.0))
         return NAN;
     const struct reach reach = { c, epsilon };
     double lo = c->z_r_mm, hi = c->z_v_mm;
@@ -90,7 +88,7 @@ static void aliasing_function(const void *context, double k_per_mm, double *valu
 
 double dipole_splat_spacing_mm(const dipole_coefficients *c, double epsilon)
 {
-    if (!(epsilon >= EPSILON_MIN && epsilon < 4.0))
+    if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 4.0))
         return NAN;
     /* The ratio lies between e^(-z_r x)/2 and e^(-z_r x), x = q - sigma_tr, which brackets x and so k. */
     const double s = c->sigma_tr_per_mm, x_hi = -log(epsilon / 4.0) / c->z_r_mm;

@@ -1,0 +1,84 @@
+/* Dual numbers: a complex value and its derivative with respect to one real parameter. */
+#ifndef LIBDIPOLE_DUAL_H
+#define LIBDIPOLE_DUAL_H
+
+#include <complex.h>
+#include <math.h>
+
+struct dual {
+    double complex v, d;
+};
+
+static inline struct dual constant(double v)
+{
+    return (struct dual){ v, 0.0 };
+}
+
+static inline struct dual add(struct dual a, struct dual b)
+{
+    return (struct dual){ a.v + b.v, a.d + b.d };
+}
+
+static inline struct dual subtract(struct dual a, struct dual b)
+{
+    return (struct dual){ a.v - b.v, a.d - b.d };
+}
+
+static inline struct dual multiply(struct dual a, struct dual b)
+{
+    return (struct dual){ a.v * b.v, a.d * b.v + a.v * b.d };
+}
+
+static inline struct dual divide(struct dual a, struct dual b)
+{
+    const double complex v = a.v / b.v;
+    return (struct dual){ v, (a.d - v * b.d) / b.v };
+}
+
+static inline struct dual scale(double s, struct dual a)
+{
+    return (struct dual){ s * a.v, s * a.d };
+}
+
+/* A root of 0 with a derivative of 0/0 (sigma_tr = 0 at k = 0, with respect to log sigma_a) has slope 0. */
+static inline struct dual root(struct dual a)
+{
+    const double complex v = csqrt(a.v);
+    return (struct dual){ v, a.d == 0.0 ? 0.0 : a.d / (2.0 * v) };
+}
+
+/* e^(-x) */
+static inline struct dual decay(struct dual x)
+{
+    const double complex v = cexp(-x.v);
+    return (struct dual){ v, -v * x.d };
+}
+
+/* 1 - e^(-x), exact for small x */
+static inline double complex fade_value(double complex x)
+{
+    const double a = -creal(x), b = -cimag(x), s = sin(0.5 * b);
+    return -(expm1(a) * cos(b) - 2.0 * s * s) - I * (exp(a) * sin(b));
+}
+
+static inline struct dual fade(struct dual x)
+{
+    return (struct dual){ fade_value(x.v), cexp(-x.v) * x.d };
+}
+
+/* (1 - e^(-x))/x, 1 at x = 0 */
+static inline struct dual fade_mean(struct dual x)
+{
+    const double complex y = x.v;
+    if (cabs(y) < 1e-2) { /* these terms leave 1e-15 of the value and 1e-12 of the slope */
+        const double complex v =
+            1.0 - y / 2.0 * (1.0 - y / 3.0 * (1.0 - y / 4.0 * (1.0 - y / 5.0 * (1.0 - y / 6.0))));
+        const double complex slope =
+            -0.5 + y / 3.0 - y * y / 8.0 + y * y * y / 30.0 - y * y * y * y / 144.0;
+        return (struct dual){ v, slope * x.d };
+    }
+    const double complex v = fade_value(y) / y;
+    return (struct dual){ v, (cexp(-y) - v) / y * x.d };
+}
+
+#endif

@@ -1,0 +1,492 @@
+/*
+ * Profiles of stacks of layers: one interface over all models. docs/theory.md T22 to T26.
+ *
+ * A half-space of the dipole and of the beam model is a row of lobes, R(r) = alpha'/(2 pi) sum_k w_k
+ * dipole_lobe(z_k). Everything else is an inverse Hankel transform of the model's response.
+ */
+#include "internal.h"
+
+#include <stdlib.h>
+
+/* A source of the half-space, depth in mean free paths; the weights sum to 1. */
+struct source {
+    double depth, weight;
+};
+
+typedef void response_function(const struct system *system, double complex k2, struct dual out[2]);
+
+struct dipole_stack {
+    size_t count;
+    dipole_layer layers[DIPOLE_LAYER_LIMIT];
+    dipole_coefficients coefficients[DIPOLE_LAYER_LIMIT];
+    response_function *response;
+    struct system system;
+    double r_floor_mm;               /* below it the profile goes on as a constant */
+    double total[2], unscattered[2]; /* by dipole_face */
+    size_t source_count;
+    struct source *sources; /* into the same allocation, as are the rest */
+    struct hankel hankel;
+    double complex (*values)[2]; /* weight x response of each node, by dipole_face */
+};
+
+/* ---- a half-space as a row of sources (T22) ------------------------------------------------------- */
+
+/*
+ * The line of sources of the beam model, in mean free paths, x = z/l and b = z_b/l = 2A/3:
+ *   w(x) = (e^(-x) - e^(-x/b))/(1 - b),
+ * by the trapezoidal rule in log x. Every integrand that is taken over it (lobe, its mean over a ring, the
+ * part within and beyond) is analytic and no larger than on the real axis for |Im log x| < pi/4, falls at
+ * least as x^2 to the left and as e^(-x/max(1, b)) to the right: a step of 1/8 leaves e^(-4 pi^2) = 7e-18,
+ * and the ends lie where 1e-17 is left, for radii down to 1e-9 mean free paths. Returns the number of
+ * sources; sources may be NULL.
+ */
+static size_t line_fill(double b, struct source *sources)
+{
+    const double step = 0.125, larger = fmax(1.0, b), smaller = fmin(1.0, b);
+    const double rate = (larger - smaller) / (larger * smaller);
+    const int first = (int)floor(log(3e-18) / step), last = (int)ceil(log(45.0 * larger) / step);
+    size_t count = 0;
+    for (int i = first; i <= last; i++, count++) {
+        if (sources == NULL)
+            continue;
+        /* the slower decay is taken out, so that b = 1 is no case of its own */
+        const double x = exp(i * step);
+        const double w = x / (larger * smaller) * exp(-x / larger) * decay_mean(x * rate);
+        sources[count] = (struct source){ x, step * x * w };
+    }
+    return count;
+}
+
+/* alpha' times the sum over the sources of factor x weight x f(depth). */
+static double source_sum(const dipole_stack *stack, double (*f)(double, double, double), bool is_weighted,
+                         double r_mm)
+{
+    const dipole_coefficients *const c = &stack->coefficients[0];
+    double sum = 0.0;
+    for (size_t k = 0; k < stack->source_count; k++) {
+        const double z_mm = stack->sources[k].depth * c->mean_free_path_mm;
+        const double fade = is_weighted ? exp(-c->sigma_tr_per_mm * z_mm) : 1.0;
+        sum += stack->sources[k].weight * fade * f(z_mm, c->sigma_tr_per_mm, r_mm);
+    }
+    return c->alpha_prime * sum;
+}
+
+/* ---- creation ------------------------------------------------------------------------------------- */
+
+static bool layers_check(const dipole_layer *layers, size_t count, dipole_status *status)
+{
+    if (count < 1 || count > DIPOLE_LAYER_LIMIT)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%zu layers, expected 1 to %d", count,
+                           (int)DIPOLE_LAYER_LIMIT);
+    for (size_t i = 0; i < count; i++) {
+        const double d = layers[i].thickness_mm;
+        const bool is_last = i + 1 == count;
+        if (!(is_last && d == INFINITY) && !(d >= DIPOLE_THICKNESS_MIN_MM && d <= DIPOLE_THICKNESS_MAX_MM))
+            return dipole_fail(
+                status, DIPOLE_BAD_VALUE, NULL, "layers[%zu].thickness_mm is %g, expected > 0 (%g to %g%s)",
+                i, d, DIPOLE_THICKNESS_MIN_MM, DIPOLE_THICKNESS_MAX_MM, is_last ? ", or infinite" : "");
+        const double ratio = i > 0 ? layers[i].medium.eta / layers[i - 1].medium.eta : 1.0;
+        if (ratio < DIPOLE_ETA_MIN || ratio > DIPOLE_ETA_MAX)
+            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                               "layers[%zu].eta is %g times that of the layer above, expected %g to %g", i,
+                               ratio, DIPOLE_ETA_MIN, DIPOLE_ETA_MAX);
+    }
+    return true;
+}
+
+static bool model_check(const dipole_stack *stack, dipole_model model, dipole_status *status)
+{
+    const bool is_half_space = stack->count == 1 && isinf(stack->layers[0].thickness_mm);
+    switch (model) {
+    case DIPOLE_MODEL_BEAM:
+        return true;
+    case DIPOLE_MODEL_DIPOLE:
+    case DIPOLE_MODEL_BETTER_DIPOLE:
+        return is_half_space ||
+               dipole_fail(
+                   status, DIPOLE_NOT_SUPPORTED, NULL,
+                   "this model knows only a half-space, expected \"beam\" or \"multipole\" for layers");
+    case DIPOLE_MODEL_MULTIPOLE:
+        for (size_t i = 0; i < stack->count; i++)
+            if (!(stack->layers[i].thickness_mm > stack->coefficients[i].mean_free_path_mm))
+                return dipole_fail(
+                    status, DIPOLE_NOT_SUPPORTED, NULL,
+                    "layers[%zu] is %g mm thick, and the source of the multipole lies %g mm deep, "
+                    "below it; expected a thicker layer, or the model \"beam\", which has no limit",
+                    i, stack->layers[i].thickness_mm, stack->coefficients[i].mean_free_path_mm);
+        return true;
+    }
+    return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "model is %d, expected a dipole_model", (int)model);
+}
+
+static bool coefficients_fill(dipole_stack *stack, dipole_status *status)
+{
+    for (size_t i = 0; i < stack->count; i++) {
+        dipole_status why;
+        if (!dipole_coefficients_init(&stack->layers[i].medium, &stack->coefficients[i], &why))
+            return stack->count == 1
+                       ? dipole_fail(status, why.code, NULL, "%s", why.message)
+                       : dipole_fail(status, why.code, NULL, "layers[%zu].%s", i, why.message);
+    }
+    return true;
+}
+
+/* Where R^ and T^ begin to be singular. Of the papers' models only a lower bound is known: the smallest
+ * sigma_tr of a layer. */
+static double singularity_per_mm(const dipole_stack *stack, dipole_model model)
+{
+    if (model == DIPOLE_MODEL_BEAM)
+        return dipole_system_first_singularity_per_mm(&stack->system);
+    double smallest = INFINITY;
+    for (size_t i = 0; i < stack->count; i++) {
+        const dipole_coefficients *const c = &stack->coefficients[i];
+        const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
+        smallest =
+            fmin(smallest, model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
+                                                               : c->sigma_tr_per_mm);
+    }
+    return smallest;
+}
+
+static void lengths_find(const dipole_stack *stack, double *shortest_mm, double *longest_mm)
+{
+    *shortest_mm = INFINITY;
+    *longest_mm = 0.0;
+    for (size_t i = 0; i < stack->count; i++) {
+        *shortest_mm = fmin(*shortest_mm, stack->coefficients[i].mean_free_path_mm);
+        *longest_mm = fmax(*longest_mm, stack->coefficients[i].mean_free_path_mm);
+    }
+}
+
+static void totals_fill(dipole_stack *stack, dipole_model model)
+{
+    struct dual totals[2];
+    stack->response(&stack->system, 0.0, totals);
+    for (int face = 0; face < 2; face++) {
+        stack->total[face] = creal(totals[face].v);
+        stack->unscattered[face] =
+            model == DIPOLE_MODEL_BEAM ? creal(stack->system.unscattered[face].v) : 0.0;
+    }
+}
+
+static void nodes_fill(dipole_stack *stack)
+{
+    for (size_t j = 0; j < stack->hankel.node_count; j++) {
+        const struct hankel_node *const node = &stack->hankel.nodes[j];
+        struct dual f[2];
+        stack->response(&stack->system, -node->kappa * node->kappa, f);
+        for (int face = 0; face < 2; face++)
+            stack->values[j][face] = node->weight * f[face].v;
+    }
+}
+
+bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model model,
+                         dipole_stack **stack_out, dipole_status *status)
+{
+    *stack_out = NULL;
+    if (!layers_check(layers, count, status))
+        return false;
+    dipole_stack draft = { .count = count };
+    for (size_t i = 0; i < count; i++) {
+        draft.layers[i] = layers[i];
+    }
+    if (!coefficients_fill(&draft, status) || !model_check(&draft, model, status))
+        return false;
+    static response_function *const responses[] = {
+        [DIPOLE_MODEL_DIPOLE] = dipole_multipole_solve,
+        [DIPOLE_MODEL_BETTER_DIPOLE] = dipole_better_dipole_solve,
+        [DIPOLE_MODEL_MULTIPOLE] = dipole_multipole_solve,
+        [DIPOLE_MODEL_BEAM] = dipole_system_solve,
+    };
+    draft.response = responses[model];
+    dipole_system_init(&draft.system, draft.layers, draft.coefficients, count, -1);
+    totals_fill(&draft, model);
+
+    double shortest_mm, longest_mm;
+    lengths_find(&draft, &shortest_mm, &longest_mm);
+    draft.r_floor_mm = 1e-9 * shortest_mm;
+    const double b = 2.0 / 3.0 * draft.coefficients[0].boundary_a;
+    const bool is_half_space = count == 1 && isinf(layers[0].thickness_mm);
+    const bool is_line = is_half_space && model == DIPOLE_MODEL_BEAM;
+    if (is_line)
+        draft.source_count = line_fill(b, NULL);
+    else if (is_half_space && model != DIPOLE_MODEL_BETTER_DIPOLE)
+        draft.source_count = 2;
+    else
+        dipole_hankel_plan(&draft.hankel, singularity_per_mm(&draft, model), draft.r_floor_mm, longest_mm);
+
+    const size_t node_count = draft.hankel.node_count;
+    dipole_stack *const stack =
+        malloc(sizeof *stack + node_count * (sizeof *stack->hankel.nodes + sizeof *stack->values) +
+               draft.source_count * sizeof *stack->sources);
+    if (stack == NULL)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
+    *stack = draft;
+    struct hankel_node *const nodes = (struct hankel_node *)(stack + 1);
+    stack->values = (double complex(*)[2])(nodes + node_count);
+    stack->sources = (struct source *)(stack->values + node_count);
+    if (is_line) {
+        line_fill(b, stack->sources);
+    } else if (stack->source_count == 2) {
+        stack->sources[0] = (struct source){ 1.0, 0.5 };
+        stack->sources[1] = (struct source){ 1.0 + 2.0 * b, 0.5 };
+    } else {
+        dipole_hankel_fill(&stack->hankel, nodes);
+        nodes_fill(stack);
+    }
+    *stack_out = stack;
+    return true;
+}
+
+void dipole_stack_destroy(dipole_stack *stack)
+{
+    free(stack);
+}
+
+size_t dipole_stack_layer_count(const dipole_stack *stack)
+{
+    return stack->count;
+}
+
+const dipole_layer *dipole_stack_layer(const dipole_stack *stack, size_t index)
+{
+    return &stack->layers[index];
+}
+
+const dipole_coefficients *dipole_stack_coefficients(const dipole_stack *stack, size_t index)
+{
+    return &stack->coefficients[index];
+}
+
+/* ---- what a stack sends out ----------------------------------------------------------------------- */
+
+double dipole_stack_total(const dipole_stack *stack, dipole_face face)
+{
+    return stack->total[face];
+}
+
+double dipole_stack_unscattered(const dipole_stack *stack, dipole_face face)
+{
+    return stack->unscattered[face];
+}
+
+double dipole_stack_spectrum(const dipole_stack *stack, dipole_face face, double k_per_mm)
+{
+    if (!(k_per_mm >= 0.0))
+        return NAN;
+    struct dual f[2];
+    stack->response(&stack->system, k_per_mm * k_per_mm, f);
+    return fmax(creal(f[face].v), 0.0);
+}
+
+static double contour_sum(const dipole_stack *stack, dipole_face face, struct hankel_range range,
+                          double complex (*kernel)(double complex, double), double r_mm)
+{
+    double sum = 0.0;
+    for (size_t j = range.first; j < range.first + range.count; j++)
+        sum += cimag(stack->values[j][face] * kernel(stack->hankel.nodes[j].kappa, r_mm));
+    return sum;
+}
+
+/* Rounding may leave a tiny negative number where the true value is next to nothing: it becomes 0. */
+static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
+{
+    if (!(r_mm >= 0.0))
+        return NAN;
+    if (isinf(r_mm) || (stack->source_count > 0 && face != DIPOLE_FACE_LIT))
+        return 0.0;
+    if (stack->source_count == 2)
+        return source_sum(stack, dipole_lobe, false, r_mm) / (2.0 * PI);
+    const double r = fmax(r_mm, stack->r_floor_mm);
+    if (stack->source_count > 0)
+        return source_sum(stack, dipole_lobe, false, r) / (2.0 * PI);
+    return fmax(0.0, contour_sum(stack, face, dipole_hankel_range_for(&stack->hankel, r),
+                                 dipole_hankel_profile_kernel, r));
+}
+
+void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face, const double *r_mm,
+                                  size_t count, double *values)
+{
+    for (size_t i = 0; i < count; i++)
+        values[i] = profile(stack, face, r_mm[i]);
+}
+
+double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r_mm)
+{
+    if (!(r_mm >= 0.0))
+        return NAN;
+    if (isinf(r_mm) || (stack->source_count > 0 && face != DIPOLE_FACE_LIT))
+        return 0.0;
+    if (stack->source_count > 0)
+        return source_sum(stack, dipole_lobe_tail, true, r_mm);
+    if (r_mm < stack->r_floor_mm)
+        return stack->total[face];
+    const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r_mm);
+    return fmax(0.0, dipole_hankel_start_share(&stack->hankel) * stack->total[face] +
+                         contour_sum(stack, face, range, dipole_hankel_beyond_kernel, r_mm));
+}
+
+double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r_mm)
+{
+    if (!(r_mm >= 0.0))
+        return NAN;
+    if (stack->source_count > 0 && face != DIPOLE_FACE_LIT)
+        return 0.0;
+    if (isinf(r_mm))
+        return stack->total[face];
+    if (stack->source_count > 0)
+        return source_sum(stack, dipole_lobe_within, true, r_mm);
+    if (r_mm < stack->r_floor_mm)
+        return PI * r_mm * r_mm * profile(stack, face, r_mm);
+    const double beyond = dipole_stack_beyond(stack, face, r_mm);
+    if (beyond < 0.5 * stack->total[face])
+        return stack->total[face] - beyond;
+    return fmax(0.0,
+                fmin(stack->total[face], contour_sum(stack, face, dipole_hankel_range_all(&stack->hankel),
+                                                     dipole_hankel_within_kernel, r_mm)));
+}
+
+/* The mean over a wide ring from the power beyond its edges; over a narrow one, where that would cancel, by
+ * Gauss's rule with five points in r^2, which is exact to 1e-12 of the profile for edges 10 % apart. */
+double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face face, double r_lo_mm,
+                                      double r_hi_mm)
+{
+    static const double gauss[5][2] = { { 0.0, 0.28444444444444444444 },
+                                        { -0.53846931010568309104, 0.23931433524968323402 },
+                                        { 0.53846931010568309104, 0.23931433524968323402 },
+                                        { -0.90617984593866399280, 0.11846344252809454376 },
+                                        { 0.90617984593866399280, 0.11846344252809454376 } };
+    if (!(r_lo_mm >= 0.0 && r_hi_mm >= r_lo_mm))
+        return NAN;
+    if (stack->source_count > 0 && face != DIPOLE_FACE_LIT)
+        return 0.0;
+    if (stack->source_count > 0 && r_hi_mm > r_lo_mm) {
+        const dipole_coefficients *const c = &stack->coefficients[0];
+        double sum = 0.0;
+        for (size_t k = 0; k < stack->source_count; k++)
+            sum += stack->sources[k].weight *
+                   dipole_lobe_ring_mean(stack->sources[k].depth * c->mean_free_path_mm, c->sigma_tr_per_mm,
+                                         r_lo_mm, r_hi_mm);
+        return c->alpha_prime / (2.0 * PI) * sum;
+    }
+    if (r_hi_mm > 1.1 * r_lo_mm) {
+        const double area_mm2 = PI * (r_hi_mm - r_lo_mm) * (r_hi_mm + r_lo_mm);
+        const double within = dipole_stack_within(stack, face, r_hi_mm);
+        if (2.0 * within < stack->total[face])
+            return (within - dipole_stack_within(stack, face, r_lo_mm)) / area_mm2;
+        return (dipole_stack_beyond(stack, face, r_lo_mm) - dipole_stack_beyond(stack, face, r_hi_mm)) /
+               area_mm2;
+    }
+    double sum = 0.0;
+    for (int i = 0; i < 5; i++) {
+        const double share = 0.5 + 0.5 * gauss[i][0];
+        const double r2 = r_lo_mm * r_lo_mm + share * (r_hi_mm - r_lo_mm) * (r_hi_mm + r_lo_mm);
+        sum += gauss[i][1] * profile(stack, face, sqrt(r2));
+    }
+    return sum;
+}
+
+double dipole_stack_r_max_mm(const dipole_stack *stack, dipole_face face, double epsilon)
+{
+    if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 1.0))
+        return NAN;
+    const double target = epsilon * stack->total[face];
+    if (!(target > 0.0))
+        return 0.0;
+    /* the power beyond falls from the total at 0: double, then halve, in log r */
+    double lo = stack->r_floor_mm, hi = stack->coefficients[0].mean_free_path_mm;
+    while (dipole_stack_beyond(stack, face, hi) > target) {
+        lo = hi;
+        hi *= 2.0;
+    }
+    while (hi > lo * (1.0 + 4e-16)) {
+        const double middle = hi > 1.1 * lo ? sqrt(lo) * sqrt(hi) : lo + 0.5 * (hi - lo);
+        if (middle <= lo || middle >= hi)
+            break;
+        if (dipole_stack_beyond(stack, face, middle) > target)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    return hi;
+}
+
+/* ---- derivatives ---------------------------------------------------------------------------------- */
+
+static void gradient_set(dipole_stack_gradient *gradient, int parameter, double value)
+{
+    double *const fields[3] = { &gradient->d_log_sigma_a, &gradient->d_log_sigma_s_prime,
+                                &gradient->d_log_thickness };
+    *fields[parameter] = value;
+}
+
+dipole_stack_gradient dipole_stack_total_gradient(const dipole_stack *stack, dipole_face face, size_t layer)
+{
+    dipole_stack_gradient gradient = { 0.0, 0.0, 0.0 };
+    for (int parameter = 0; parameter < 3; parameter++) {
+        struct system system;
+        struct dual f[2];
+        dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
+                           3 * (int)layer + parameter);
+        stack->response(&system, 0.0, f);
+        gradient_set(&gradient, parameter, creal(f[face].d));
+    }
+    return gradient;
+}
+
+/* Of a row of sources, whose depths are multiples of the mean free path and whose weights are constant: as
+ * T12. */
+static dipole_stack_gradient sources_gradient(const dipole_stack *stack, double r_mm)
+{
+    const dipole_coefficients *const c = &stack->coefficients[0];
+    double value = 0.0, d_log_z = 0.0, d_sigma_tr2 = 0.0;
+    for (size_t k = 0; k < stack->source_count; k++) {
+        const struct lobe_gradient g = dipole_lobe_differentiate(
+            stack->sources[k].depth * c->mean_free_path_mm, c->sigma_tr_per_mm, r_mm);
+        value += stack->sources[k].weight * g.value;
+        d_log_z += stack->sources[k].weight * g.d_log_z;
+        d_sigma_tr2 += stack->sources[k].weight * g.d_sigma_tr2;
+    }
+    const double scale = c->alpha_prime / (2.0 * PI), absorbed = c->sigma_a_per_mm * c->mean_free_path_mm;
+    return (dipole_stack_gradient){
+        .d_log_sigma_a =
+            scale * (3.0 * c->sigma_a_per_mm * (c->sigma_t_prime_per_mm + c->sigma_a_per_mm) * d_sigma_tr2 -
+                     absorbed * (value + d_log_z)),
+        .d_log_sigma_s_prime = scale * (absorbed * value - c->alpha_prime * d_log_z +
+                                        3.0 * c->sigma_a_per_mm * c->sigma_s_prime_per_mm * d_sigma_tr2),
+    };
+}
+
+void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, size_t layer,
+                                   const double *r_mm, size_t count, dipole_stack_gradient *gradients)
+{
+    for (size_t i = 0; i < count; i++) {
+        gradients[i] = (dipole_stack_gradient){ 0.0, 0.0, 0.0 };
+        if (!(r_mm[i] >= 0.0))
+            gradients[i] = (dipole_stack_gradient){ NAN, NAN, NAN };
+        else if (stack->source_count > 0 && face == DIPOLE_FACE_LIT && !isinf(r_mm[i]))
+            gradients[i] = sources_gradient(
+                stack, stack->source_count == 2 ? r_mm[i] : fmax(r_mm[i], stack->r_floor_mm));
+    }
+    if (stack->source_count > 0)
+        return;
+    for (int parameter = 0; parameter < 3; parameter++) {
+        struct system system;
+        dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
+                           3 * (int)layer + parameter);
+        for (size_t i = 0; i < count; i++) {
+            if (!(r_mm[i] >= 0.0) || isinf(r_mm[i]))
+                continue;
+            const double r = fmax(r_mm[i], stack->r_floor_mm);
+            const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r);
+            double sum = 0.0;
+            for (size_t j = range.first; j < range.first + range.count; j++) {
+                const struct hankel_node *const node = &stack->hankel.nodes[j];
+                struct dual f[2];
+                stack->response(&system, -node->kappa * node->kappa, f);
+                sum += cimag(node->weight * f[face].d * dipole_hankel_profile_kernel(node->kappa, r));
+            }
+            gradient_set(&gradients[i], parameter, sum);
+        }
+    }
+}
