@@ -19,7 +19,8 @@ struct coefficients {
     double eta;
     double sigma_a_per_mm[IO_CHANNEL_COUNT];
     double sigma_s_prime_per_mm[IO_CHANNEL_COUNT];
-    bool has_sigma_s; /* sigma_s_prime is sigma_s (1 - g) */
+    bool has_sigma_s;       /* sigma_s_prime is sigma_s (1 - g)                  */
+    const char *length_key; /* of the form by reflectance; NULL for the others */
     int fdr_kind;
 };
 
@@ -28,15 +29,10 @@ struct coefficients {
 /* Keys and models that the format has and this version has not: not a slip of the user's pen. */
 static bool check_supported(const struct io_json *at, dipole_status *status)
 {
-    static const char *const keys[] = { "layers", "diffuse_reflectance", "mean_free_path_mm",
-                                        "diffuse_mean_free_path_mm" };
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        const struct io_json member = io_json_member(at, keys[i]);
-        if (member.value)
-            return io_json_fail(&member, DIPOLE_NOT_SUPPORTED, status,
-                                "is not supported by this version, expected sigma_a_per_mm with "
-                                "sigma_s_prime_per_mm, or with sigma_s_per_mm and g");
-    }
+    const struct io_json layers = io_json_member(at, "layers");
+    if (layers.value)
+        return io_json_fail(&layers, DIPOLE_NOT_SUPPORTED, status,
+                            "is not supported by this version, expected one medium");
     int model = 0;
     if (!io_json_get_choice(at, "model", model_names, &model, status))
         return false;
@@ -46,9 +42,49 @@ static bool check_supported(const struct io_json *at, dipole_status *status)
                                       model_names[model]);
 }
 
-/* Exactly one of the two ways to give scattering. */
-static bool check_form(const struct io_json *at, dipole_status *status)
+static const char reflectance_key[] = "diffuse_reflectance";
+static const char *const length_keys[] = { "mean_free_path_mm", "diffuse_mean_free_path_mm" };
+
+/* Reflectance with exactly one of the two lengths, and no coefficient beside. */
+static bool check_reflectance_form(const struct io_json *at, const char **length_key_out,
+                                   dipole_status *status)
 {
+    static const char *const others[] = { "sigma_a_per_mm", "sigma_s_prime_per_mm", "sigma_s_per_mm", "g" };
+    const struct io_json reflectance = io_json_member(at, reflectance_key);
+    const struct io_json lengths[] = { io_json_member(at, length_keys[0]),
+                                       io_json_member(at, length_keys[1]) };
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        const struct io_json other = io_json_member(at, others[i]);
+        if (other.value)
+            return io_json_fail(
+                &other, DIPOLE_BAD_VALUE, status,
+                "stands beside %s, expected either coefficients or a reflectance with a length",
+                reflectance.value  ? reflectance_key
+                : lengths[0].value ? length_keys[0]
+                                   : length_keys[1]);
+    }
+    if (!reflectance.value)
+        return io_json_fail(&reflectance, DIPOLE_BAD_VALUE, status,
+                            "is missing, expected beside a mean free path");
+    if (lengths[0].value && lengths[1].value)
+        return io_json_fail(
+            &lengths[1], DIPOLE_BAD_VALUE, status,
+            "stands beside mean_free_path_mm, expected one of them: 1/sigma_t' is the mean free "
+            "path, 1/sigma_tr the diffuse one");
+    if (!lengths[0].value && !lengths[1].value)
+        return io_json_fail(
+            &lengths[0], DIPOLE_BAD_VALUE, status,
+            "is missing, expected it or diffuse_mean_free_path_mm beside diffuse_reflectance");
+    *length_key_out = length_keys[lengths[0].value ? 0 : 1];
+    return true;
+}
+
+/* Exactly one of the ways to give a medium. */
+static bool check_form(const struct io_json *at, const char **length_key_out, dipole_status *status)
+{
+    if (io_json_member(at, reflectance_key).value || io_json_member(at, length_keys[0]).value ||
+        io_json_member(at, length_keys[1]).value)
+        return check_reflectance_form(at, length_key_out, status);
     const struct io_json sigma_a = io_json_member(at, "sigma_a_per_mm");
     const struct io_json sigma_s_prime = io_json_member(at, "sigma_s_prime_per_mm");
     const struct io_json sigma_s = io_json_member(at, "sigma_s_per_mm");
@@ -89,13 +125,49 @@ static bool get_g(const struct io_json *at, double g_out[IO_CHANNEL_COUNT], dipo
     return true;
 }
 
+/* sigma_a and sigma_s' of each channel from its reflectance and length. */
+static bool invert(const struct io_json *at, struct coefficients *out, dipole_status *status)
+{
+    double reflectance[IO_CHANNEL_COUNT], length_mm[IO_CHANNEL_COUNT];
+    if (!io_json_get_numbers(at, reflectance_key, IO_CHANNEL_COUNT, 0.0, 1.0, reflectance, status) ||
+        !io_json_get_numbers(at, out->length_key, IO_CHANNEL_COUNT, -INFINITY, INFINITY, length_mm, status))
+        return false;
+    const bool is_diffuse = out->length_key == length_keys[1];
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
+        dipole_medium medium;
+        dipole_status found;
+        if (!(is_diffuse ? dipole_medium_from_diffuse_mean_free_path : dipole_medium_from_mean_free_path)(
+                reflectance[c], length_mm[c], out->eta, (dipole_fdr_kind)out->fdr_kind, DIPOLE_MODEL_DIPOLE,
+                &medium, &found)) {
+            const char *const keys[] = { reflectance_key, out->length_key, "eta" };
+            for (size_t k = 0; k < 3; k++) {
+                const size_t length = strlen(keys[k]);
+                if (strncmp(found.message, keys[k], length) != 0 || found.message[length] != ' ')
+                    continue;
+                const struct io_json member = io_json_member(at, keys[k]),
+                                     element = io_json_element(&member, c);
+                return io_json_fail(k < 2 ? &element : &member, found.code, status, "%s",
+                                    found.message + length + 1);
+            }
+            return io_json_fail(at, found.code, status, "channel %s: %s", io_channel_names[c],
+                                found.message);
+        }
+        out->sigma_a_per_mm[c] = medium.sigma_a_per_mm;
+        out->sigma_s_prime_per_mm[c] = medium.sigma_s_prime_per_mm;
+    }
+    return true;
+}
+
 static bool get_coefficients(const struct io_json *at, struct coefficients *out, dipole_status *status)
 {
     double sigma_s_per_mm[IO_CHANNEL_COUNT], g[IO_CHANNEL_COUNT];
     out->has_sigma_s = io_json_member(at, "sigma_s_per_mm").value != NULL;
     if (!io_json_get_number(at, "eta", -INFINITY, INFINITY, &out->eta, status) ||
-        !io_json_get_choice(at, "fdr", fdr_names, &out->fdr_kind, status) ||
-        !io_json_get_numbers(at, "sigma_a_per_mm", IO_CHANNEL_COUNT, -INFINITY, INFINITY,
+        !io_json_get_choice(at, "fdr", fdr_names, &out->fdr_kind, status))
+        return false;
+    if (out->length_key)
+        return invert(at, out, status);
+    if (!io_json_get_numbers(at, "sigma_a_per_mm", IO_CHANNEL_COUNT, -INFINITY, INFINITY,
                              out->sigma_a_per_mm, status))
         return false;
     if (!out->has_sigma_s)
@@ -151,14 +223,25 @@ static void warn_of_units(const dipole_coefficients *coefficients, size_t channe
 
 bool io_material_parse(const struct io_json *at, struct io_material *out, dipole_status *status)
 {
-    static const char *const known[] = {
-        "name",   "eta",    "model", "fdr", "sigma_a_per_mm", "sigma_s_prime_per_mm", "sigma_s_per_mm", "g",
-        "source", "extras", "fit",   NULL
-    };
+    static const char *const known[] = { "name",
+                                         "eta",
+                                         "model",
+                                         "fdr",
+                                         "sigma_a_per_mm",
+                                         "sigma_s_prime_per_mm",
+                                         "sigma_s_per_mm",
+                                         "g",
+                                         reflectance_key,
+                                         length_keys[0],
+                                         length_keys[1],
+                                         "source",
+                                         "extras",
+                                         "fit",
+                                         NULL };
     struct coefficients coefficients = { .fdr_kind = DIPOLE_FDR_EXACT };
     struct io_material material = { 0 };
     if ((json_is_object(at->value) && !check_supported(at, status)) ||
-        !io_json_check_object(at, known, 2, status) || !check_form(at, status) ||
+        !io_json_check_object(at, known, 2, status) || !check_form(at, &coefficients.length_key, status) ||
         !io_json_get_text(at, "name", material.name, sizeof material.name, status) ||
         !io_json_get_text(at, "source", material.source, sizeof material.source, status) ||
         !get_coefficients(at, &coefficients, status))

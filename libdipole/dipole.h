@@ -296,6 +296,28 @@ DIPOLE_API void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_
                                               const double *r_mm, size_t count,
                                               dipole_stack_gradient *gradients);
 
+/* ---- media from reflectance and a length -------------------------------------------------------- */
+
+/*
+ * The medium of which a half-space sends diffuse_reflectance back, by the dipole or the beam model.
+ * theory.md T28.
+ *
+ *   diffuse_reflectance        0 to 1; below 1 beside the diffuse mean free path
+ *   mean_free_path_mm          1/sigma_t', 1e-50 to 1e50
+ *   diffuse_mean_free_path_mm  1/sigma_tr, 1e-50 to 1e50: the other length that is called a "radius"
+ *
+ * The reflectance of *out is the one given to 1e-12, and so is what would be absorbed. Fails with
+ * DIPOLE_BAD_VALUE, or DIPOLE_NOT_SUPPORTED for other models; *out is then untouched.
+ */
+DIPOLE_API DIPOLE_CHECKED bool dipole_medium_from_mean_free_path(double diffuse_reflectance,
+                                                                 double mean_free_path_mm, double eta,
+                                                                 dipole_fdr_kind fdr_kind,
+                                                                 dipole_model model, dipole_medium *out,
+                                                                 dipole_status *status);
+DIPOLE_API DIPOLE_CHECKED bool dipole_medium_from_diffuse_mean_free_path(
+    double diffuse_reflectance, double diffuse_mean_free_path_mm, double eta, dipole_fdr_kind fdr_kind,
+    dipole_model model, dipole_medium *out, dipole_status *status);
+
 #ifdef __cplusplus
 }
 #endif

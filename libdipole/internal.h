@@ -33,6 +33,11 @@ static inline double decay_mean(double x)
     return x > 0.0 ? -expm1(-x) / x : 1.0;
 }
 
+/* A falling function of x > 0 and its derivative with respect to log x. */
+typedef void falling_function(const void *context, double x, double *value, double *d_log_x);
+/* Its root in [lo, hi], 0 < lo < hi, to rounding (sampling.c). */
+double dipole_find_root(falling_function *function, const void *context, double lo, double hi);
+
 /* C_2 = int_0^1 F(mu) mu^2 dmu for light inside (fresnel.c). T24 */
 double dipole_fresnel_second_moment_inside(double eta);
 

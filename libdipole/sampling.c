@@ -1,14 +1,11 @@
 /* How far the light reaches and how densely it must be sampled. docs/theory.md T9, T11. */
 #include "internal.h"
 
-/* A falling function of x > 0 and its derivative with respect to log x. */
-typedef void falling_function(const void *context, double x, double *value, double *d_log_x);
-
 /*
  * The root in [lo, hi] by Newton's method in log x, kept inside a shrinking bracket by bisection; ends
  * when the bracket or the step is below one part in 10^15.
  */
-static double find_root(falling_function *function, const void *context, double lo, double hi)
+double dipole_find_root(falling_function *function, const void *context, double lo, double hi)
 {
     double log_lo = log(lo), log_hi = log(hi), log_x = 0.5 * (log_lo + log_hi);
     for (int i = 0; i < 200; i++) {
@@ -68,7 +65,7 @@ double dipole_r_max_mm(const dipole_coefficients *c, double epsilon)
         lo *= 0.5;
     while (dipole_tail_fraction(c, hi) > epsilon)
         hi *= 2.0;
-    return find_root(reach_function, &reach, lo, hi);
+    return dipole_find_root(reach_function, &reach, lo, hi);
 }
 
 /* ---- splat spacing (T11) -------------------------------------------------------------------------- */
@@ -99,5 +96,5 @@ double dipole_splat_spacing_mm(const dipole_coefficients *c, double epsilon)
         lo *= 0.5;
         aliasing_function(&reach, lo, &value, &slope);
     }
-    return 2.0 * PI / find_root(aliasing_function, &reach, lo, k_hi);
+    return 2.0 * PI / dipole_find_root(aliasing_function, &reach, lo, k_hi);
 }

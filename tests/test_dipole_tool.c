@@ -275,7 +275,8 @@ static void bad_input_is_named(void **state)
           "}",
           "2:2: unknown key \"sigmaa\", expected name, eta, model, fdr, sigma_a_per_mm, "
           "sigma_s_prime_per_mm, "
-          "sigma_s_per_mm, g, source, extras, fit" },
+          "sigma_s_per_mm, g, diffuse_reflectance, mean_free_path_mm, diffuse_mean_free_path_mm, source, "
+          "extras, fit" },
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char expected[1024];

@@ -132,7 +132,8 @@ static void failures_name_key_value_and_range(void **state)
           "eta is -1.3, expected > 0 (0.1 to 10)" },
         { HEAD SIGMAS ", \"sigma_t\": 1}", DIPOLE_BAD_VALUE, 2, 71,
           "unknown key \"sigma_t\", expected name, eta, model, fdr, sigma_a_per_mm, sigma_s_prime_per_mm, "
-          "sigma_s_per_mm, g, source, extras, fit" },
+          "sigma_s_per_mm, g, diffuse_reflectance, mean_free_path_mm, diffuse_mean_free_path_mm, source, "
+          "extras, fit" },
         { HEAD "\"sigma_a_per_mm\": [1, -0.2, 0], \"sigma_s_prime_per_mm\": [1, 2, 3]}", DIPOLE_BAD_VALUE,
           2, 23, "sigma_a_per_mm[1] is -0.2, expected >= 0 (0, or 1e-50 to 1e+50)" },
         { HEAD "\"sigma_a_per_mm\": [1, 0, 0], \"sigma_s_prime_per_mm\": [1, 2, 1e60]}", DIPOLE_BAD_VALUE,
@@ -170,13 +171,30 @@ static void failures_name_key_value_and_range(void **state)
         { HEAD SIGMAS ", \"model\": \"cone\"}", DIPOLE_BAD_VALUE, 2, 80,
           "model is \"cone\", expected \"dipole\" or \"multipole\" or \"better_dipole\" or \"beam\"" },
         { HEAD "\"layers\": []}", DIPOLE_NOT_SUPPORTED, 2, 11,
-          "layers is not supported by this version, expected sigma_a_per_mm with sigma_s_prime_per_mm, or "
-          "with "
-          "sigma_s_per_mm and g" },
-        { HEAD "\"diffuse_reflectance\": [1, 1, 1], \"mean_free_path_mm\": [1, 1, 1]}",
-          DIPOLE_NOT_SUPPORTED, 2, 24,
-          "diffuse_reflectance is not supported by this version, expected sigma_a_per_mm with "
-          "sigma_s_prime_per_mm, or with sigma_s_per_mm and g" },
+          "layers is not supported by this version, expected one medium" },
+        { HEAD "\"diffuse_reflectance\": [1, 1.5, 1], \"mean_free_path_mm\": [1, 1, 1]}", DIPOLE_BAD_VALUE,
+          2, 28, "diffuse_reflectance[1] is 1.5, expected 0 to 1" },
+        { HEAD "\"diffuse_reflectance\": [1, 0, 1], \"mean_free_path_mm\": [1, 1, -2]}", DIPOLE_BAD_VALUE,
+          2, 63, "mean_free_path_mm[2] is -2, expected > 0 (1e-50 to 1e+50)" },
+        { HEAD "\"diffuse_reflectance\": [0.5, 1, 0], \"diffuse_mean_free_path_mm\": [1, 1, 1]}",
+          DIPOLE_BAD_VALUE, 2, 30,
+          "diffuse_reflectance[1] is 1, where light travels without end, expected less beside "
+          "diffuse_mean_free_path_mm" },
+        { HEAD "\"diffuse_reflectance\": [1, 1, 1]}", DIPOLE_BAD_VALUE, 1, 1,
+          "mean_free_path_mm is missing, expected it or diffuse_mean_free_path_mm beside "
+          "diffuse_reflectance" },
+        { HEAD "\"mean_free_path_mm\": [1, 1, 1]}", DIPOLE_BAD_VALUE, 1, 1,
+          "diffuse_reflectance is missing, expected beside a mean free path" },
+        { HEAD "\"diffuse_reflectance\": [1, 1, 1], \"mean_free_path_mm\": [1, 1, 1], "
+               "\"diffuse_mean_free_path_mm\": [1, 1, 1]}",
+          DIPOLE_BAD_VALUE, 2, 96,
+          "diffuse_mean_free_path_mm stands beside mean_free_path_mm, expected one of them: 1/sigma_t' is "
+          "the "
+          "mean free path, 1/sigma_tr the diffuse one" },
+        { HEAD SIGMAS ", \"diffuse_reflectance\": [1, 1, 1]}", DIPOLE_BAD_VALUE, 2, 19,
+          "sigma_a_per_mm stands beside diffuse_reflectance, expected either coefficients or a reflectance "
+          "with a "
+          "length" },
         { "[1]", DIPOLE_BAD_VALUE, 1, 1, "the whole is an array, expected an object" },
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -190,6 +208,31 @@ static void failures_name_key_value_and_range(void **state)
             status.column != cases[i].column)
             fail_msg("%s: code %d at %d:%d, expected %d at %d:%d", cases[i].message, status.code,
                      status.line, status.column, cases[i].code, cases[i].line, cases[i].column);
+    }
+}
+
+/* Oracle: the way forth. A material given by reflectance and length has that reflectance and that length.
+ */
+static void reflectance_and_length_give_the_coefficients(void **state)
+{
+    (void)state;
+    static const char *const texts[2] = {
+        HEAD "\"diffuse_reflectance\": [0.83, 0.5, 0.01], \"mean_free_path_mm\": [0.45, 2, 30]}",
+        HEAD "\"diffuse_reflectance\": [0.83, 0.5, 0.01], \"diffuse_mean_free_path_mm\": [0.45, 2, 30]}",
+    };
+    const double reflectance[3] = { 0.83, 0.5, 0.01 }, length_mm[3] = { 0.45, 2, 30 };
+    for (int i = 0; i < 2; i++) {
+        struct io_material material;
+        dipole_status status;
+        if (!parse(texts[i], &material, &status))
+            fail_msg("%s", status.message);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            dipole_coefficients k;
+            assert_true(dipole_coefficients_init(&material.medium[c], &k, NULL));
+            assert_close(dipole_diffuse_reflectance(&k), reflectance[c], 1e-12, "channel %d", c);
+            assert_close(i == 0 ? k.mean_free_path_mm : 1 / k.sigma_tr_per_mm, length_mm[c], 1e-12,
+                         "channel %d", c);
+        }
     }
 }
 
@@ -352,6 +395,7 @@ int main(void)
         cmocka_unit_test(jensen_materials_have_the_measured_reflectance),
         cmocka_unit_test(scattering_with_g_is_reduced),
         cmocka_unit_test(failures_name_key_value_and_range),
+        cmocka_unit_test(reflectance_and_length_give_the_coefficients),
         cmocka_unit_test(a_material_inside_a_scene_is_named_by_its_path),
         cmocka_unit_test(a_unit_slip_is_warned_of),
         cmocka_unit_test(what_is_written_is_read_back),
