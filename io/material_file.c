@@ -223,21 +223,21 @@ static void warn_of_units(const dipole_coefficients *coefficients, size_t channe
 
 bool io_material_parse(const struct io_json *at, struct io_material *out, dipole_status *status)
 {
-    static const char *const known[] = { "name",
-                                         "eta",
-                                         "model",
-                                         "fdr",
-                                         "sigma_a_per_mm",
-                                         "sigma_s_prime_per_mm",
-                                         "sigma_s_per_mm",
-                                         "g",
-                                         reflectance_key,
-                                         length_keys[0],
-                                         length_keys[1],
-                                         "source",
-                                         "extras",
-                                         "fit",
-                                         NULL };
+    const char *const known[] = { "name",
+                                  "eta",
+                                  "model",
+                                  "fdr",
+                                  "sigma_a_per_mm",
+                                  "sigma_s_prime_per_mm",
+                                  "sigma_s_per_mm",
+                                  "g",
+                                  reflectance_key,
+                                  length_keys[0],
+                                  length_keys[1],
+                                  "source",
+                                  "extras",
+                                  "fit",
+                                  NULL };
     struct coefficients coefficients = { .fdr_kind = DIPOLE_FDR_EXACT };
     struct io_material material = { 0 };
     if ((json_is_object(at->value) && !check_supported(at, status)) ||
