@@ -38,7 +38,7 @@ static bool print_result(const struct inspector_result *result, bool is_json, di
     char *text = NULL;
     if (!inspector_result_format_json(result, &text, status))
         return false;
-    puts(text);
+    fputs(text, stdout);
     free(text);
     return cli_stdout_finish(status);
 }

@@ -179,7 +179,7 @@ bool inspector_result_format_json(const struct inspector_result *result, char **
         is_done ? json_pack("{s:s, s:f, s:f, s:O}", "material", result->material.name, "epsilon",
                             result->epsilon, "eta", result->material.medium[0].eta, "channels", channels)
                 : NULL;
-    *text_out = root ? json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) : NULL;
+    *text_out = root ? io_json_format(root) : NULL;
     json_decref(root);
     json_decref(channels);
     return *text_out || dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for the result");

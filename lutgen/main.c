@@ -143,10 +143,9 @@ static bool print_json(const struct job *jobs, int count, dipole_status *status)
                                        "size", jobs[i].lut->axis.node_count, "max_relative_error",
                                        jobs[i].lut->max_relative_error, "bake_ms", jobs[i].bake_ms)) == 0;
     json_t *const result = json_pack("{s:O?}", "files", files);
-    char *const text =
-        is_done && result ? json_dumps(result, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) : NULL;
+    char *const text = is_done && result ? io_json_format(result) : NULL;
     if (text)
-        puts(text);
+        fputs(text, stdout);
     else
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
                     "out of memory for the result (is a path not UTF-8?)");

@@ -32,12 +32,12 @@ static bool print_json(const struct render_report *report, const char *path, dip
                                                  effect->is_active, "reason", effect->reason, "ms",
                                                  effect->time_ms));
     }
-    json_t *const result = json_pack("{s:s, s:f, s:o, s:f, s:s}", "technique",
+    json_t *const result = json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique",
                                      render_technique_names[report->technique], "epsilon", report->epsilon,
                                      "effects", effects, "total_ms", report->total_ms, "image", path);
-    char *const text = result ? json_dumps(result, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) : NULL;
+    char *const text = result ? io_json_format(result) : NULL;
     if (text)
-        puts(text);
+        fputs(text, stdout);
     else
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the result (is a path not UTF-8?)");
     const bool done = text != NULL;
