@@ -100,8 +100,8 @@ int main(void)
     const dipole_layer stack[2] = { { marble_green, 1.0 },
                                     { { 0.0021, 2.19, 1.5, DIPOLE_FDR_EXACT }, INFINITY } };
     if (!dipole_coefficients_init(&marble_green, &coefficients, NULL) ||
-        !dipole_stack_create(stack + 1, 1, DIPOLE_MODEL_BEAM, &half_space, NULL) ||
-        !dipole_stack_create(stack, 2, DIPOLE_MODEL_BEAM, &layers, NULL))
+        !dipole_stack_create(stack + 1, 1, DIPOLE_MODEL_BEAM, DIPOLE_FROM_ABOVE, &half_space, NULL) ||
+        !dipole_stack_create(stack, 2, DIPOLE_MODEL_BEAM, DIPOLE_FROM_ABOVE, &layers, NULL))
         return EXIT_FAILED;
     for (int i = 0; i < RADIUS_COUNT; i++)
         radii_mm[i] = 20.0 * i / RADIUS_COUNT;

@@ -232,21 +232,25 @@ enum { DIPOLE_LAYER_LIMIT = 16 };
 /* Where light leaves: through the face it entered, or the other. */
 typedef enum dipole_face { DIPOLE_FACE_LIT = 0, DIPOLE_FACE_FAR } dipole_face;
 
+/* Which side the light comes from: onto the first layer, or from below onto the last, which is then finite.
+ */
+typedef enum dipole_side { DIPOLE_FROM_ABOVE = 0, DIPOLE_FROM_BELOW } dipole_side;
+
 /* A stack of layers in one colour channel, immutable: any number of threads may use one. */
 typedef struct dipole_stack dipole_stack;
 
 /*
- * Prepare count (1 to DIPOLE_LAYER_LIMIT) layers, light entering the first at normal incidence.
+ * Prepare count (1 to DIPOLE_LAYER_LIMIT) layers, light entering at normal incidence from one side.
  * The caller owns *stack_out and ends it with dipole_stack_destroy(). Fails with DIPOLE_BAD_VALUE (naming
  * layer, field, value and range), DIPOLE_NOT_SUPPORTED (the model cannot do these layers) or
  * DIPOLE_OUT_OF_MEMORY; *stack_out is then NULL.
  */
 DIPOLE_API DIPOLE_CHECKED bool dipole_stack_create(const dipole_layer *layers, size_t count,
-                                                   dipole_model model, dipole_stack **stack_out,
-                                                   dipole_status *status);
+                                                   dipole_model model, dipole_side side,
+                                                   dipole_stack **stack_out, dipole_status *status);
 DIPOLE_API void dipole_stack_destroy(dipole_stack *stack);
 
-/* What layer was given, and what was derived from it; index below the count. */
+/* What layer was given, and what was derived from it; index below the count, from the top. */
 DIPOLE_API const dipole_layer *dipole_stack_layer(const dipole_stack *stack, size_t index);
 DIPOLE_API const dipole_coefficients *dipole_stack_coefficients(const dipole_stack *stack, size_t index);
 DIPOLE_API size_t dipole_stack_layer_count(const dipole_stack *stack);
@@ -286,7 +290,12 @@ DIPOLE_API double dipole_stack_beyond(const dipole_stack *stack, dipole_face fac
 /* Radius beyond which a part epsilon (1e-100 to below 1) of what the face sends out leaves. T9 */
 DIPOLE_API double dipole_stack_r_max_mm(const dipole_stack *stack, dipole_face face, double epsilon);
 
-/* Derivatives with respect to the logarithms of one layer's parameters. */
+/* Spacing of a square grid of light samples whose aliasing is at most epsilon (1e-100 to below 4) of what
+ * the face sends out. T11. NaN outside the range. */
+DIPOLE_API double dipole_stack_splat_spacing_mm(const dipole_stack *stack, dipole_face face,
+                                                double epsilon);
+
+/* Derivatives with respect to the logarithms of one layer's parameters; layer counts from the top. */
 typedef struct dipole_stack_gradient {
     double d_log_sigma_a, d_log_sigma_s_prime, d_log_thickness;
 } dipole_stack_gradient;

@@ -17,7 +17,8 @@ typedef void response_function(const struct system *system, double complex k2, s
 
 struct dipole_stack {
     size_t count;
-    dipole_layer layers[DIPOLE_LAYER_LIMIT];
+    dipole_side side;
+    dipole_layer layers[DIPOLE_LAYER_LIMIT]; /* in the order in which the light meets them */
     dipole_coefficients coefficients[DIPOLE_LAYER_LIMIT];
     response_function *response;
     struct system system;
@@ -71,9 +72,15 @@ static double source_sum(const dipole_stack *stack, double (*f)(double, double, 
     return c->alpha_prime * sum;
 }
 
+/* The place of a layer, counted from the top, in the order in which the light meets them; and back. */
+static size_t place(const dipole_stack *stack, size_t index)
+{
+    return stack->side == DIPOLE_FROM_ABOVE ? index : stack->count - 1 - index;
+}
+
 /* ---- creation ------------------------------------------------------------------------------------- */
 
-static bool layers_check(const dipole_layer *layers, size_t count, dipole_status *status)
+static bool layers_check(const dipole_layer *layers, size_t count, dipole_side side, dipole_status *status)
 {
     if (count < 1 || count > DIPOLE_LAYER_LIMIT)
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%zu layers, expected 1 to %d", count,
@@ -91,6 +98,12 @@ static bool layers_check(const dipole_layer *layers, size_t count, dipole_status
                                "layers[%zu].eta is %g times that of the layer above, expected %g to %g", i,
                                ratio, DIPOLE_ETA_MIN, DIPOLE_ETA_MAX);
     }
+    if (side == DIPOLE_FROM_BELOW && isinf(layers[count - 1].thickness_mm))
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "layers[%zu].thickness_mm is inf, expected a finite one for light from below",
+                           count - 1);
+    if (side != DIPOLE_FROM_ABOVE && side != DIPOLE_FROM_BELOW)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "side is %d, expected a dipole_side", (int)side);
     return true;
 }
 
@@ -113,7 +126,8 @@ static bool model_check(const dipole_stack *stack, dipole_model model, dipole_st
                     status, DIPOLE_NOT_SUPPORTED, NULL,
                     "layers[%zu] is %g mm thick, and the source of the multipole lies %g mm deep, "
                     "below it; expected a thicker layer, or the model \"beam\", which has no limit",
-                    i, stack->layers[i].thickness_mm, stack->coefficients[i].mean_free_path_mm);
+                    place(stack, i), stack->layers[i].thickness_mm,
+                    stack->coefficients[i].mean_free_path_mm);
         return true;
     }
     return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "model is %d, expected a dipole_model", (int)model);
@@ -124,9 +138,9 @@ static bool coefficients_fill(dipole_stack *stack, dipole_status *status)
     for (size_t i = 0; i < stack->count; i++) {
         dipole_status why;
         if (!dipole_coefficients_init(&stack->layers[i].medium, &stack->coefficients[i], &why))
-            return stack->count == 1
-                       ? dipole_fail(status, why.code, NULL, "%s", why.message)
-                       : dipole_fail(status, why.code, NULL, "layers[%zu].%s", i, why.message);
+            return stack->count == 1 ? dipole_fail(status, why.code, NULL, "%s", why.message)
+                                     : dipole_fail(status, why.code, NULL, "layers[%zu].%s",
+                                                   place(stack, i), why.message);
     }
     return true;
 }
@@ -180,16 +194,15 @@ static void nodes_fill(dipole_stack *stack)
     }
 }
 
-bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model model,
+bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model model, dipole_side side,
                          dipole_stack **stack_out, dipole_status *status)
 {
     *stack_out = NULL;
-    if (!layers_check(layers, count, status))
+    if (!layers_check(layers, count, side, status))
         return false;
-    dipole_stack draft = { .count = count };
-    for (size_t i = 0; i < count; i++) {
-        draft.layers[i] = layers[i];
-    }
+    dipole_stack draft = { .count = count, .side = side };
+    for (size_t i = 0; i < count; i++)
+        draft.layers[i] = layers[place(&draft, i)];
     if (!coefficients_fill(&draft, status) || !model_check(&draft, model, status))
         return false;
     static response_function *const responses[] = {
@@ -250,12 +263,12 @@ size_t dipole_stack_layer_count(const dipole_stack *stack)
 
 const dipole_layer *dipole_stack_layer(const dipole_stack *stack, size_t index)
 {
-    return &stack->layers[index];
+    return &stack->layers[place(stack, index)];
 }
 
 const dipole_coefficients *dipole_stack_coefficients(const dipole_stack *stack, size_t index)
 {
-    return &stack->coefficients[index];
+    return &stack->coefficients[place(stack, index)];
 }
 
 /* ---- what a stack sends out ----------------------------------------------------------------------- */
@@ -411,6 +424,34 @@ double dipole_stack_r_max_mm(const dipole_stack *stack, dipole_face face, double
     return hi;
 }
 
+/* log of spectrum(k)/spectrum(0) over epsilon/4, which falls with k; bisected in log k. */
+double dipole_stack_splat_spacing_mm(const dipole_stack *stack, dipole_face face, double epsilon)
+{
+    if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 4.0))
+        return NAN;
+    const double target = 0.25 * epsilon * stack->total[face];
+    if (!(target > 0.0))
+        return INFINITY;
+    double lo = 0.0, hi = stack->coefficients[0].sigma_t_prime_per_mm;
+    while (dipole_stack_spectrum(stack, face, hi) > target) {
+        lo = hi;
+        hi *= 2.0;
+    }
+    while (lo == 0.0) {
+        if (dipole_stack_spectrum(stack, face, 0.5 * hi) > target)
+            lo = 0.5 * hi;
+        else
+            hi *= 0.5;
+    }
+    for (double middle; middle = 0.5 * (lo + hi), middle > lo && middle < hi;) {
+        if (dipole_stack_spectrum(stack, face, middle) > target)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    return 2.0 * PI / hi;
+}
+
 /* ---- derivatives ---------------------------------------------------------------------------------- */
 
 static void gradient_set(dipole_stack_gradient *gradient, int parameter, double value)
@@ -427,7 +468,7 @@ dipole_stack_gradient dipole_stack_total_gradient(const dipole_stack *stack, dip
         struct system system;
         struct dual f[2];
         dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
-                           3 * (int)layer + parameter);
+                           3 * (int)place(stack, layer) + parameter);
         stack->response(&system, 0.0, f);
         gradient_set(&gradient, parameter, creal(f[face].d));
     }
@@ -473,7 +514,7 @@ void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, 
     for (int parameter = 0; parameter < 3; parameter++) {
         struct system system;
         dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
-                           3 * (int)layer + parameter);
+                           3 * (int)place(stack, layer) + parameter);
         for (size_t i = 0; i < count; i++) {
             if (!(r_mm[i] >= 0.0) || isinf(r_mm[i]))
                 continue;

@@ -8,7 +8,7 @@ static double total_of(const dipole_medium *medium, dipole_model model, dipole_c
 {
     const dipole_layer base = { *medium, INFINITY };
     dipole_stack *stack;
-    assert_true(dipole_stack_create(&base, 1, model, &stack, NULL));
+    assert_true(dipole_stack_create(&base, 1, model, DIPOLE_FROM_ABOVE, &stack, NULL));
     const double total = dipole_stack_total(stack, DIPOLE_FACE_LIT);
     *coefficients = *dipole_stack_coefficients(stack, 0);
     dipole_stack_destroy(stack);

@@ -10,7 +10,7 @@ static dipole_stack *stack_of(const dipole_layer *layers, size_t count, dipole_m
 {
     dipole_stack *stack;
     dipole_status status;
-    if (!dipole_stack_create(layers, count, model, &stack, &status))
+    if (!dipole_stack_create(layers, count, model, DIPOLE_FROM_ABOVE, &stack, &status))
         fail_msg("%s", status.message);
     return stack;
 }
@@ -525,6 +525,63 @@ static void rings_add_up_and_r_max_is_the_root(void **state)
     dipole_stack_destroy(stack);
 }
 
+/* Oracle: the same layers turned over. What a layer is called does not change; a base without end cannot be
+ * lit from below. */
+static void light_from_below_meets_the_layers_in_reverse(void **state)
+{
+    (void)state;
+    const dipole_layer down[3] = { layer(0.1, 2.0, 1.3, 0.8), layer(0.01, 1.0, 1.5, 3.0),
+                                   layer(0.3, 0.5, 1.4, 1.5) };
+    const dipole_layer up[3] = { down[2], down[1], down[0] };
+    dipole_stack *turned = stack_of(up, 3, DIPOLE_MODEL_BEAM), *below;
+    assert_true(dipole_stack_create(down, 3, DIPOLE_MODEL_BEAM, DIPOLE_FROM_BELOW, &below, NULL));
+    assert_true(dipole_stack_layer(below, 0)->medium.eta == 1.3);
+    assert_true(dipole_stack_coefficients(below, 2)->eta == 1.4);
+    for (int f = 0; f < 2; f++) {
+        const dipole_face face = (dipole_face)f;
+        assert_true(dipole_stack_total(below, face) == dipole_stack_total(turned, face));
+        assert_true(dipole_stack_unscattered(below, face) == dipole_stack_unscattered(turned, face));
+        assert_true(profile(below, face, 0.7) == profile(turned, face, 0.7));
+        for (size_t i = 0; i < 3; i++) {
+            const dipole_stack_gradient a = dipole_stack_total_gradient(below, face, i),
+                                        b = dipole_stack_total_gradient(turned, face, 2 - i);
+            assert_true(a.d_log_sigma_a == b.d_log_sigma_a && a.d_log_thickness == b.d_log_thickness);
+        }
+    }
+    dipole_stack_destroy(turned);
+    dipole_stack_destroy(below);
+    const dipole_layer base = layer(0.1, 2.0, 1.3, INFINITY);
+    dipole_status status;
+    assert_false(dipole_stack_create(&base, 1, DIPOLE_MODEL_BEAM, DIPOLE_FROM_BELOW, &below, &status));
+    assert_string_equal(status.message,
+                        "layers[0].thickness_mm is inf, expected a finite one for light from below");
+}
+
+/* Oracle: T11 itself, 4 spectrum(2 pi/h) = epsilon spectrum(0), and the classical dipole's own. */
+static void splat_spacing_solves_its_equation(void **state)
+{
+    (void)state;
+    const dipole_layer layers[2] = { layer(0.1, 2.0, 1.3, 0.8), layer(0.01, 1.0, 1.5, 3.0) },
+                       skin = layer(0.032, 0.74, 1.3, INFINITY);
+    dipole_stack *const stack = stack_of(layers, 2, DIPOLE_MODEL_BEAM), *const one = stack_of(
+                                                                            &skin, 1, DIPOLE_MODEL_DIPOLE);
+    for (double epsilon = 1.0; epsilon > 1e-9; epsilon *= 0.1) {
+        for (int f = 0; f < 2; f++) {
+            const double h = dipole_stack_splat_spacing_mm(stack, (dipole_face)f, epsilon);
+            assert_close(4.0 * dipole_stack_spectrum(stack, (dipole_face)f, 2.0 * PI / h),
+                         epsilon * dipole_stack_total(stack, (dipole_face)f), 1e-12, "face %d, epsilon %g",
+                         f, epsilon);
+        }
+        assert_close(dipole_stack_splat_spacing_mm(one, DIPOLE_FACE_LIT, epsilon),
+                     dipole_splat_spacing_mm(dipole_stack_coefficients(one, 0), epsilon), 1e-12,
+                     "epsilon %g", epsilon);
+    }
+    assert_true(isnan(dipole_stack_splat_spacing_mm(stack, DIPOLE_FACE_LIT, 4.0)));
+    assert_true(isinf(dipole_stack_splat_spacing_mm(one, DIPOLE_FACE_FAR, 0.01)));
+    dipole_stack_destroy(stack);
+    dipole_stack_destroy(one);
+}
+
 /* Oracle: the messages that dipole.h promises; *stack_out is NULL. */
 static void bad_stacks_are_refused(void **state)
 {
@@ -564,7 +621,8 @@ static void bad_stacks_are_refused(void **state)
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         dipole_stack *stack = (dipole_stack *)&stack;
         dipole_status status;
-        assert_false(dipole_stack_create(rows[i].layers, rows[i].count, rows[i].model, &stack, &status));
+        assert_false(dipole_stack_create(rows[i].layers, rows[i].count, rows[i].model, DIPOLE_FROM_ABOVE,
+                                         &stack, &status));
         assert_null(stack);
         assert_int_equal(status.code, rows[i].code);
         assert_string_equal(status.message, rows[i].message);
@@ -598,6 +656,8 @@ int main(void)
         cmocka_unit_test(better_dipole_is_that_of_the_reference),
         cmocka_unit_test(gradients_are_the_slopes_of_the_values),
         cmocka_unit_test(rings_add_up_and_r_max_is_the_root),
+        cmocka_unit_test(light_from_below_meets_the_layers_in_reverse),
+        cmocka_unit_test(splat_spacing_solves_its_equation),
         cmocka_unit_test(bad_stacks_are_refused),
     };
     return cmocka_run_group_tests_name("stack", tests, NULL, NULL);
