@@ -1,5 +1,9 @@
 /* The classical dipole: profile, totals, spectrum, gradients. docs/theory.md T4 to T8, T10, T12. */
 #include "internal.h"
+#include "lobe.h"
+#include "row.h"
+
+#include <limits.h>
 
 /* ---- coefficients (T4) ---------------------------------------------------------------------------- */
 
@@ -44,21 +48,28 @@ bool dipole_coefficients_init(const dipole_medium *medium, dipole_coefficients *
                                medium->eta, fdr);
     }
     const double sigma_a = medium->sigma_a_per_mm, sigma_s_prime = medium->sigma_s_prime_per_mm;
-    const double sigma_t_prime = sigma_a + sigma_s_prime;
-    dipole_coefficients c = {
+    const double boundary_a = (1.0 + fdr) / fdt;
+    const struct dd one = { 1.0, 0.0 }, sigma_t_prime = dd_sum(sigma_a, sigma_s_prime);
+    const struct dd sigma_tr = dd_root(dd_multiply(dd_product(3.0, sigma_a), sigma_t_prime));
+    const struct dd z_r = dd_divide(one, sigma_t_prime);
+    const struct dd z_v =
+        dd_multiply(z_r, dd_add(one, dd_divide(dd_product(4.0, boundary_a), (struct dd){ 3.0, 0.0 })));
+    *out = (dipole_coefficients){
         .sigma_a_per_mm = sigma_a,
         .sigma_s_prime_per_mm = sigma_s_prime,
         .eta = medium->eta,
-        .sigma_t_prime_per_mm = sigma_t_prime,
-        .alpha_prime = sigma_s_prime / sigma_t_prime,
-        .mean_free_path_mm = 1.0 / sigma_t_prime,
-        .sigma_tr_per_mm = sqrt(3.0 * sigma_a * sigma_t_prime),
+        .sigma_t_prime_per_mm = sigma_t_prime.hi,
+        .alpha_prime = sigma_s_prime / sigma_t_prime.hi,
+        .mean_free_path_mm = z_r.hi,
+        .sigma_tr_per_mm = sigma_tr.hi,
         .fdr = fdr,
-        .boundary_a = (1.0 + fdr) / fdt,
-        .z_r_mm = 1.0 / sigma_t_prime,
+        .boundary_a = boundary_a,
+        .z_r_mm = z_r.hi,
+        .z_v_mm = z_v.hi,
+        .sigma_tr_low_per_mm = sigma_tr.lo,
+        .z_r_low_mm = z_r.lo,
+        .z_v_low_mm = z_v.lo,
     };
-    c.z_v_mm = c.z_r_mm + source_separation_mm(&c);
-    *out = c;
     return true;
 }
 
@@ -69,24 +80,19 @@ static bool is_distance(double r_mm)
     return r_mm >= 0.0;
 }
 
-/* z (sigma_tr + 1/d) e^(-sigma_tr d) / d^2, in an order in which no factor overflows; the exponential is
- * split in two, so that it does not underflow before a large 1/d^2 has been multiplied in. */
-double dipole_lobe(double z_mm, double sigma_tr_per_mm, double r_mm)
-{
-    const double d = hypot(r_mm, z_mm), x = sigma_tr_per_mm * d;
-    if (!(x < 2000.0) || isinf(d))
-        return 0.0;
-    const double root = exp(-0.5 * x);
-    return (z_mm / d) * ((1.0 + x) / d) * root / d * root;
-}
-
 double dipole_rd_per_mm2(const dipole_coefficients *c, double r_mm)
 {
-    if (!is_distance(r_mm))
-        return NAN;
-    return c->alpha_prime / (4.0 * PI) *
-           (dipole_lobe(c->z_r_mm, c->sigma_tr_per_mm, r_mm) +
-            dipole_lobe(c->z_v_mm, c->sigma_tr_per_mm, r_mm));
+    struct row_of_two pair;
+    dipole_row_of_two_init(c, &pair);
+    return dipole_row_value(&pair.row, r_mm);
+}
+
+void dipole_rd_profile_per_mm2(const dipole_coefficients *c, const double *r_mm, size_t count,
+                               double *values)
+{
+    struct row_of_two pair;
+    dipole_row_of_two_init(c, &pair);
+    dipole_row_profile(&pair.row, r_mm, count, values);
 }
 
 /* ---- integrals (T6, T7, T8) ----------------------------------------------------------------------- */
@@ -97,104 +103,60 @@ double dipole_diffuse_reflectance(const dipole_coefficients *c)
            (exp(-c->sigma_tr_per_mm * c->z_r_mm) + exp(-c->sigma_tr_per_mm * c->z_v_mm));
 }
 
-/*
- * Mean of 2 * lobe over a ring. The antiderivative z e^(-sigma d)/d is differenced by hand:
- *   z e^(-s d_lo)/d_lo - z e^(-s d_hi)/d_hi = z e^(-s d_lo)/d_hi [D/d_lo + 1 - e^(-s D)],  D = d_hi - d_lo,
- * and the ring's area is pi D (d_hi + d_lo), so that D divides out and nothing cancels however thin it is.
- */
-double dipole_lobe_ring_mean(double z_mm, double sigma_tr_per_mm, double r_lo_mm, double r_hi_mm)
-{
-    const double d_lo = hypot(r_lo_mm, z_mm), d_hi = hypot(r_hi_mm, z_mm);
-    if (isinf(d_hi) || !(sigma_tr_per_mm * d_lo < 2000.0))
-        return 0.0;
-    const double difference = (r_hi_mm - r_lo_mm) * ((r_hi_mm + r_lo_mm) / (d_hi + d_lo));
-    const double root = exp(-0.5 * sigma_tr_per_mm * d_lo);
-    const double slope = 1.0 / d_lo + sigma_tr_per_mm * decay_mean(sigma_tr_per_mm * difference);
-    return 2.0 * (z_mm / d_hi) * root * slope / (d_hi + d_lo) * root;
-}
-
 double dipole_rd_ring_mean_per_mm2(const dipole_coefficients *c, double r_lo_mm, double r_hi_mm)
 {
     if (!(is_distance(r_lo_mm) && r_hi_mm >= r_lo_mm))
         return NAN;
-    return c->alpha_prime / (4.0 * PI) *
-           (dipole_lobe_ring_mean(c->z_r_mm, c->sigma_tr_per_mm, r_lo_mm, r_hi_mm) +
-            dipole_lobe_ring_mean(c->z_v_mm, c->sigma_tr_per_mm, r_lo_mm, r_hi_mm));
-}
-
-/* 1 - (z/d) e^(-sigma_tr (d - z)) as a sum of two positive terms: the part of one lobe within r. */
-double dipole_lobe_within(double z_mm, double sigma_tr_per_mm, double r_mm)
-{
-    const double d = hypot(r_mm, z_mm);
-    if (isinf(d))
-        return 1.0;
-    const double excess = path_excess_mm(z_mm, r_mm);
-    return excess / d - (z_mm / d) * expm1(-sigma_tr_per_mm * excess);
+    struct row_of_two pair;
+    dipole_row_of_two_init(c, &pair);
+    return c->alpha_prime / (2.0 * PI) * dipole_row_ring_mean(&pair.row, r_lo_mm, r_hi_mm);
 }
 
 double dipole_reflectance_within(const dipole_coefficients *c, double r_mm)
 {
     if (!is_distance(r_mm))
         return NAN;
-    const double s = c->sigma_tr_per_mm;
-    return 0.5 * c->alpha_prime *
-           (exp(-s * c->z_r_mm) * dipole_lobe_within(c->z_r_mm, s, r_mm) +
-            exp(-s * c->z_v_mm) * dipole_lobe_within(c->z_v_mm, s, r_mm));
+    struct row_of_two pair;
+    dipole_row_of_two_init(c, &pair);
+    return fmin(c->alpha_prime * dipole_row_within(&pair.row, r_mm), dipole_diffuse_reflectance(c));
 }
 
-/* (z/d) e^(-sigma_tr (d - z)): the part of one lobe beyond r. */
-double dipole_lobe_tail(double z_mm, double sigma_tr_per_mm, double r_mm)
-{
-    const double d = hypot(r_mm, z_mm);
-    return isinf(d) ? 0.0 : (z_mm / d) * exp(-sigma_tr_per_mm * path_excess_mm(z_mm, r_mm));
-}
-
-/* The common factor e^(-sigma_tr z_r) is divided out, so that no total underflows. */
+/* Scaled by 2^64 until the total, which is at least e^(-sqrt 3)/2, has been divided out, so that what ends
+ * as a subnormal number is rounded once. */
 double dipole_tail_fraction(const dipole_coefficients *c, double r_mm)
 {
     if (!is_distance(r_mm))
         return NAN;
-    const double s = c->sigma_tr_per_mm, virtual_weight = exp(-s * source_separation_mm(c));
-    return (dipole_lobe_tail(c->z_r_mm, s, r_mm) + virtual_weight * dipole_lobe_tail(c->z_v_mm, s, r_mm)) /
-           (1.0 + virtual_weight);
+    struct row_of_two pair;
+    dipole_row_of_two_init(c, &pair);
+    const double total =
+        0.5 * (exp(-c->sigma_tr_per_mm * c->z_r_mm) + exp(-c->sigma_tr_per_mm * c->z_v_mm));
+    return fmin(dipole_row_beyond(&pair.row, 0x1p64, r_mm) / total * 0x1p-64, 1.0);
 }
 
 /* ---- spectrum (T10) ------------------------------------------------------------------------------- */
+
+/* e^(-z q) with z and q to 32 digits, as in lobe.h */
+static double plane_decay(double z_mm, double z_low_mm, struct dd q)
+{
+    const double x = z_mm * q.hi;
+    const double x_low = product_error(z_mm, q.hi, x) + (z_mm * q.lo + z_low_mm * q.hi);
+    return decay_times(1.0, decay_split(x, x_low));
+}
 
 double dipole_spectrum(const dipole_coefficients *c, double k_per_mm)
 {
     if (!(k_per_mm >= 0.0))
         return NAN;
-    const double q = hypot(c->sigma_tr_per_mm, k_per_mm);
-    return 0.5 * c->alpha_prime * (exp(-q * c->z_r_mm) + exp(-q * c->z_v_mm));
+    const double k = fmin(k_per_mm, LOBE_FAR_MM); /* where nothing is left */
+    const struct dd s = { c->sigma_tr_per_mm, c->sigma_tr_low_per_mm };
+    const struct dd q = dd_root(dd_add(dd_product(k, k), dd_multiply(s, s)));
+    return 0.5 * c->alpha_prime *
+           (plane_decay(c->z_r_mm, c->z_r_low_mm, q) + plane_decay(c->z_v_mm, c->z_v_low_mm, q));
 }
 
 /* ---- derivatives (T12) ---------------------------------------------------------------------------- */
 
-/*
- * One lobe g = z (x + 1) e^(-x) / d^3, x = sigma_tr d, and how it answers to its two parameters:
- *   dg / d log z         = (z/d^3) e^(-x) [(x + 1) - (z/d)^2 (x^2 + 3x + 3)]
- *   dg / d (sigma_tr^2)  = -(z/d) e^(-x) / 2, finite at sigma_tr = 0
- */
-struct lobe_gradient dipole_lobe_differentiate(double z_mm, double sigma_tr_per_mm, double r_mm)
-{
-    const double d = hypot(r_mm, z_mm), x = sigma_tr_per_mm * d;
-    if (!(x < 2000.0) || isinf(d))
-        return (struct lobe_gradient){ 0.0, 0.0, 0.0 };
-    const double root = exp(-0.5 * x), slant = z_mm / d;
-    const double bracket = (x + 1.0) - slant * slant * ((x + 3.0) * x + 3.0);
-    return (struct lobe_gradient){
-        .value = slant * ((x + 1.0) / d) * root / d * root,
-        .d_log_z = slant * (bracket / d) * root / d * root,
-        .d_sigma_tr2 = -0.5 * slant * root * root,
-    };
-}
-
-/* With absorbed = 1 - alpha' = sigma_a / sigma_t':
- *   d alpha' / d log sigma_a = -alpha' absorbed = -d alpha' / d log sigma_s'
- *   d log z / d log sigma_a = -absorbed          d log z / d log sigma_s' = -alpha'
- *   d sigma_tr^2 / d log sigma_a = 3 sigma_a (sigma_t' + sigma_a)    ... / d log sigma_s' = 3 sigma_a
- * sigma_s' The derivative with respect to sigma itself divides by it analytically. */
 dipole_gradient dipole_rd_gradient(const dipole_coefficients *c, double r_mm)
 {
     const dipole_derivative d = dipole_rd_derivative(c, r_mm);
@@ -202,25 +164,73 @@ dipole_gradient dipole_rd_gradient(const dipole_coefficients *c, double r_mm)
                               c->sigma_s_prime_per_mm * d.d_sigma_s_prime };
 }
 
+/* What the bracket of one lobe's derivatives is made of. */
+struct derivative_terms {
+    struct dd alpha_prime, absorbed, l, sigma_a, slope_a; /* 3/2 (sigma_t' + sigma_a) */
+};
+
+/* Adds 4 pi dR_d/dsigma of one lobe to each sum, times 2^-*exponent:
+ *   d/dsigma_a  = u e^(-x) alpha' {-3/2 (sigma_t' + sigma_a) - (l/d^2) [2 (x + 1) - u^2 P]}
+ *   d/dsigma_s' = u e^(-x) {(l/d^2) [absorbed (x + 1) - alpha' (x + 1 - u^2 P)] - 3/2 alpha' sigma_a}
+ * with u = z/d, P = x^2 + 3x + 3. The braces change sign, and so does the sum over both lobes: 32 digits
+ * throughout. */
+static void derivative_add(const struct derivative_terms *t, struct dd z, struct dd sigma_tr, double r,
+                           int *exponent, struct dd *d_sigma_a, struct dd *d_sigma_s_prime)
+{
+    const struct dd one = { 1.0, 0.0 }, three = { 3.0, 0.0 };
+    const struct dd d =
+        r > LOBE_FAR_MM ? (struct dd){ r, 0.0 } : dd_root(dd_add(dd_product(r, r), dd_multiply(z, z)));
+    struct dd x = dd_multiply(sigma_tr, d);
+    if (x.hi > 1400.0)
+        x = (struct dd){ 1400.0, 0.0 };
+    const struct dd u = dd_divide(z, d), x_1 = dd_add(one, x);
+    const struct dd p = dd_multiply(dd_multiply(u, u), dd_add(dd_multiply(x, dd_add(x, three)), three));
+    const struct dd l_d2 = dd_divide(dd_divide(t->l, d), d), rest = dd_add(x_1, dd_negate(p));
+    const struct dd brace_a =
+        dd_negate(dd_multiply(t->alpha_prime, dd_add(t->slope_a, dd_multiply(l_d2, dd_add(x_1, rest)))));
+    const struct dd inner =
+        dd_add(dd_multiply(t->absorbed, x_1), dd_negate(dd_multiply(t->alpha_prime, rest)));
+    const struct dd brace_s =
+        dd_add(dd_multiply(l_d2, inner), dd_scale(-1.5, dd_multiply(t->alpha_prime, t->sigma_a)));
+    int own;
+    const struct dd weight = dd_multiply(u, dd_decay(x, &own));
+    if (*exponent == INT_MIN)
+        *exponent = own; /* of the real source, which is nearer */
+    const double shift = own - *exponent < -300 ? 0.0 : ldexp(1.0, own - *exponent);
+    *d_sigma_a = dd_add(*d_sigma_a, dd_scale(shift, dd_multiply(weight, brace_a)));
+    *d_sigma_s_prime = dd_add(*d_sigma_s_prime, dd_scale(shift, dd_multiply(weight, brace_s)));
+}
+
 dipole_derivative dipole_rd_derivative(const dipole_coefficients *c, double r_mm)
 {
     if (!is_distance(r_mm))
         return (dipole_derivative){ NAN, NAN };
-    const struct lobe_gradient real = dipole_lobe_differentiate(c->z_r_mm, c->sigma_tr_per_mm, r_mm);
-    const struct lobe_gradient virtual = dipole_lobe_differentiate(c->z_v_mm, c->sigma_tr_per_mm, r_mm);
-    const double value = real.value + virtual.value;
-    const double d_log_z = real.d_log_z + virtual.d_log_z;
-    const double d_sigma_tr2 = real.d_sigma_tr2 + virtual.d_sigma_tr2;
-    const double mean_free_path = c->mean_free_path_mm, alpha_prime = c->alpha_prime;
-    const double absorbed = c->sigma_a_per_mm * mean_free_path;
-    return (dipole_derivative){
-        .d_sigma_a = alpha_prime / (4.0 * PI) *
-                     (3.0 * (c->sigma_t_prime_per_mm + c->sigma_a_per_mm) * d_sigma_tr2 -
-                      mean_free_path * (value + d_log_z)),
-        .d_sigma_s_prime = 1.0 / (4.0 * PI) *
-                           (mean_free_path * (absorbed * value - alpha_prime * d_log_z) +
-                            3.0 * alpha_prime * c->sigma_a_per_mm * d_sigma_tr2),
+    const struct dd z_r = { c->z_r_mm, c->z_r_low_mm }, z_v = { c->z_v_mm, c->z_v_low_mm };
+    const struct dd sigma_tr = { c->sigma_tr_per_mm, c->sigma_tr_low_per_mm };
+    const struct dd sigma_a = { c->sigma_a_per_mm, 0.0 };
+    const struct dd sigma_t_prime = dd_sum(c->sigma_a_per_mm, c->sigma_s_prime_per_mm);
+    const struct derivative_terms terms = {
+        .alpha_prime = dd_scale(c->sigma_s_prime_per_mm, z_r),
+        .absorbed = dd_scale(c->sigma_a_per_mm, z_r),
+        .l = z_r,
+        .sigma_a = sigma_a,
+        .slope_a = dd_scale(1.5, dd_add(sigma_t_prime, sigma_a)),
     };
+    struct dd d_sigma_a = { 0.0, 0.0 }, d_sigma_s_prime = { 0.0, 0.0 };
+    const double r = lobe_distance(r_mm);
+    int exponent = INT_MIN;
+    derivative_add(&terms, z_r, sigma_tr, r, &exponent, &d_sigma_a, &d_sigma_s_prime);
+    derivative_add(&terms, z_v, sigma_tr, r, &exponent, &d_sigma_a, &d_sigma_s_prime);
+    return (dipole_derivative){ ldexp(d_sigma_a.hi / (4.0 * PI), exponent),
+                                ldexp(d_sigma_s_prime.hi / (4.0 * PI), exponent) };
+}
+
+void dipole_rd_profile_gradient(const dipole_coefficients *c, const double *r_mm, size_t count,
+                                double *values, double *d_log_sigma_a, double *d_log_sigma_s_prime)
+{
+    struct row_of_two pair;
+    dipole_row_of_two_init(c, &pair);
+    dipole_row_gradient(&pair.row, r_mm, count, values, d_log_sigma_a, d_log_sigma_s_prime);
 }
 
 /* sigma_tr z_r = sqrt(3 absorbed), so the total depends on absorbed = 1 - alpha' alone. */

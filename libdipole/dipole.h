@@ -135,14 +135,15 @@ typedef struct dipole_medium {
 
 /* What every dipole formula needs, derived once. Read it freely; fill it by dipole_coefficients_init. */
 typedef struct dipole_coefficients {
-    double sigma_a_per_mm, sigma_s_prime_per_mm, eta; /* as given                          */
-    double sigma_t_prime_per_mm;                      /* sigma_a + sigma_s'                */
-    double alpha_prime;                               /* sigma_s' / sigma_t', 0 to 1       */
-    double mean_free_path_mm;                         /* 1 / sigma_t'                      */
-    double sigma_tr_per_mm;                           /* sqrt(3 sigma_a sigma_t')          */
-    double fdr;                                       /* internal diffuse reflectance      */
-    double boundary_a;                                /* A = (1 + Fdr) / (1 - Fdr)         */
-    double z_r_mm, z_v_mm;                            /* depth of real, height of virtual source */
+    double sigma_a_per_mm, sigma_s_prime_per_mm, eta;   /* as given                          */
+    double sigma_t_prime_per_mm;                        /* sigma_a + sigma_s'                */
+    double alpha_prime;                                 /* sigma_s' / sigma_t', 0 to 1       */
+    double mean_free_path_mm;                           /* 1 / sigma_t'                      */
+    double sigma_tr_per_mm;                             /* sqrt(3 sigma_a sigma_t')          */
+    double fdr;                                         /* internal diffuse reflectance      */
+    double boundary_a;                                  /* A = (1 + Fdr) / (1 - Fdr)         */
+    double z_r_mm, z_v_mm;                              /* depth of real, height of virtual source */
+    double sigma_tr_low_per_mm, z_r_low_mm, z_v_low_mm; /* what rounding took from these three        */
 } dipole_coefficients;
 
 /*
@@ -164,6 +165,10 @@ DIPOLE_API DIPOLE_CHECKED bool dipole_coefficients_init(const dipole_medium *med
  */
 DIPOLE_API double dipole_rd_per_mm2(const dipole_coefficients *coefficients, double r_mm);
 
+/* The same at count radii, several times faster a radius; relative error below 1e-16 (8 + sigma_tr r). */
+DIPOLE_API void dipole_rd_profile_per_mm2(const dipole_coefficients *coefficients, const double *r_mm,
+                                          size_t count, double *values);
+
 /* Derivatives of R_d(r) with respect to log sigma_a and log sigma_s', eta held. theory.md T12.
  * Both are finite at sigma_a = 0 and at sigma_s' = 0 (there they are 0). */
 typedef struct dipole_gradient {
@@ -179,6 +184,15 @@ typedef struct dipole_derivative {
 } dipole_derivative;
 
 DIPOLE_API dipole_derivative dipole_rd_derivative(const dipole_coefficients *coefficients, double r_mm);
+
+/*
+ * R_d and its derivatives with respect to log sigma_a and log sigma_s' at count radii, each an array of
+ * count doubles. For fits: many times faster than one by one, where every digit is kept; here each error is
+ * below 1e-15 of the terms that the derivative is made of, (1 + sigma_tr r)^2 R_d at most.
+ */
+DIPOLE_API void dipole_rd_profile_gradient(const dipole_coefficients *coefficients, const double *r_mm,
+                                           size_t count, double *values, double *d_log_sigma_a,
+                                           double *d_log_sigma_s_prime);
 
 /* Total diffuse reflectance, the integral of R_d over the plane, 0 to 1. theory.md T6. */
 DIPOLE_API double dipole_diffuse_reflectance(const dipole_coefficients *coefficients);

@@ -41,23 +41,6 @@ double dipole_find_root(falling_function *function, const void *context, double 
 /* C_2 = int_0^1 F(mu) mu^2 dmu for light inside (fresnel.c). T24 */
 double dipole_fresnel_second_moment_inside(double eta);
 
-/* ---- lobes: what one source at depth z sends out of a half-space with phi = 0 at its surface ------- */
-
-/* z (sigma_tr + 1/d) e^(-sigma_tr d) / d^2, d = hypot(r, z). T5 */
-double dipole_lobe(double z_mm, double sigma_tr_per_mm, double r_mm);
-/* Mean of the lobe over a ring. T7 */
-double dipole_lobe_ring_mean(double z_mm, double sigma_tr_per_mm, double r_lo_mm, double r_hi_mm);
-/* 1 - (z/d) e^(-sigma_tr (d - z)), of which e^(-sigma_tr z) times is the part within r. T7 */
-double dipole_lobe_within(double z_mm, double sigma_tr_per_mm, double r_mm);
-/* (z/d) e^(-sigma_tr (d - z)), of which e^(-sigma_tr z) times is the part beyond r. T8 */
-double dipole_lobe_tail(double z_mm, double sigma_tr_per_mm, double r_mm);
-
-/* The lobe and how it answers to its two parameters. T12 */
-struct lobe_gradient {
-    double value, d_log_z, d_sigma_tr2;
-};
-struct lobe_gradient dipole_lobe_differentiate(double z_mm, double sigma_tr_per_mm, double r_mm);
-
 /* ---- one spatial frequency of a stack (layers.c) -------------------------------------------------- */
 
 struct slab {

@@ -1,17 +1,14 @@
 /*
  * Profiles of stacks of layers: one interface over all models. docs/theory.md T22 to T26.
  *
- * A half-space of the dipole and of the beam model is a row of lobes, R(r) = alpha'/(2 pi) sum_k w_k
- * dipole_lobe(z_k). Everything else is an inverse Hankel transform of the model's response.
+ * A half-space of the dipole and of the beam model is a row of sources (row.h). Everything else is an
+ * inverse Hankel transform of the model's response.
  */
 #include "internal.h"
+#include "row.h"
 
 #include <stdlib.h>
-
-/* A source of the half-space, depth in mean free paths; the weights sum to 1. */
-struct source {
-    double depth, weight;
-};
+#include <string.h>
 
 typedef void response_function(const struct system *system, double complex k2, struct dual out[2]);
 
@@ -24,53 +21,10 @@ struct dipole_stack {
     struct system system;
     double r_floor_mm;               /* below it the profile goes on as a constant */
     double total[2], unscattered[2]; /* by dipole_face */
-    size_t source_count;
-    struct source *sources; /* into the same allocation, as are the rest */
+    struct row row; /* of a half-space; count 0 for none; into the same allocation, as are the rest */
     struct hankel hankel;
     double complex (*values)[2]; /* weight x response of each node, by dipole_face */
 };
-
-/* ---- a half-space as a row of sources (T22) ------------------------------------------------------- */
-
-/*
- * The line of sources of the beam model, in mean free paths, x = z/l and b = z_b/l = 2A/3:
- *   w(x) = (e^(-x) - e^(-x/b))/(1 - b),
- * by the trapezoidal rule in log x. Every integrand that is taken over it (lobe, its mean over a ring, the
- * part within and beyond) is analytic and no larger than on the real axis for |Im log x| < pi/4, falls at
- * least as x^2 to the left and as e^(-x/max(1, b)) to the right: a step of 1/8 leaves e^(-4 pi^2) = 7e-18,
- * and the ends lie where 1e-17 is left, for radii down to 1e-9 mean free paths. Returns the number of
- * sources; sources may be NULL.
- */
-static size_t line_fill(double b, struct source *sources)
-{
-    const double step = 0.125, larger = fmax(1.0, b), smaller = fmin(1.0, b);
-    const double rate = (larger - smaller) / (larger * smaller);
-    const int first = (int)floor(log(3e-18) / step), last = (int)ceil(log(45.0 * larger) / step);
-    size_t count = 0;
-    for (int i = first; i <= last; i++, count++) {
-        if (sources == NULL)
-            continue;
-        /* the slower decay is taken out, so that b = 1 is no case of its own */
-        const double x = exp(i * step);
-        const double w = x / (larger * smaller) * exp(-x / larger) * decay_mean(x * rate);
-        sources[count] = (struct source){ x, step * x * w };
-    }
-    return count;
-}
-
-/* alpha' times the sum over the sources of factor x weight x f(depth). */
-static double source_sum(const dipole_stack *stack, double (*f)(double, double, double), bool is_weighted,
-                         double r_mm)
-{
-    const dipole_coefficients *const c = &stack->coefficients[0];
-    double sum = 0.0;
-    for (size_t k = 0; k < stack->source_count; k++) {
-        const double z_mm = stack->sources[k].depth * c->mean_free_path_mm;
-        const double fade = is_weighted ? exp(-c->sigma_tr_per_mm * z_mm) : 1.0;
-        sum += stack->sources[k].weight * fade * f(z_mm, c->sigma_tr_per_mm, r_mm);
-    }
-    return c->alpha_prime * sum;
-}
 
 /* The place of a layer, counted from the top, in the order in which the light meets them; and back. */
 static size_t place(const dipole_stack *stack, size_t index)
@@ -194,6 +148,25 @@ static void nodes_fill(dipole_stack *stack)
     }
 }
 
+/* The row of sources of a half-space, in 3 row.count doubles. */
+static void row_fill(dipole_stack *stack, double *storage)
+{
+    const size_t count = stack->row.count;
+    const dipole_coefficients *const c = &stack->coefficients[0];
+    double *const depth_mm = storage, *const depth_low_mm = storage + count,
+                  *const weight = storage + 2 * count;
+    if (count == 2) {
+        struct row_of_two pair;
+        dipole_row_of_two_init(c, &pair);
+        memcpy(depth_mm, pair.depth_mm, sizeof pair.depth_mm);
+        memcpy(depth_low_mm, pair.depth_low_mm, sizeof pair.depth_low_mm);
+        memcpy(weight, pair.weight, sizeof pair.weight);
+    } else {
+        dipole_row_beam_fill(c, depth_mm, depth_low_mm, weight);
+    }
+    stack->row = (struct row){ c, count, depth_mm, depth_low_mm, weight };
+}
+
 bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model model, dipole_side side,
                          dipole_stack **stack_out, dipole_status *status)
 {
@@ -218,31 +191,25 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
     double shortest_mm, longest_mm;
     lengths_find(&draft, &shortest_mm, &longest_mm);
     draft.r_floor_mm = 1e-9 * shortest_mm;
-    const double b = 2.0 / 3.0 * draft.coefficients[0].boundary_a;
     const bool is_half_space = count == 1 && isinf(layers[0].thickness_mm);
-    const bool is_line = is_half_space && model == DIPOLE_MODEL_BEAM;
-    if (is_line)
-        draft.source_count = line_fill(b, NULL);
+    if (is_half_space && model == DIPOLE_MODEL_BEAM)
+        draft.row.count = dipole_row_beam_count(&draft.coefficients[0]);
     else if (is_half_space && model != DIPOLE_MODEL_BETTER_DIPOLE)
-        draft.source_count = 2;
+        draft.row.count = 2;
     else
         dipole_hankel_plan(&draft.hankel, singularity_per_mm(&draft, model), draft.r_floor_mm, longest_mm);
 
     const size_t node_count = draft.hankel.node_count;
     dipole_stack *const stack =
         malloc(sizeof *stack + node_count * (sizeof *stack->hankel.nodes + sizeof *stack->values) +
-               draft.source_count * sizeof *stack->sources);
+               3 * draft.row.count * sizeof(double));
     if (stack == NULL)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
     *stack = draft;
     struct hankel_node *const nodes = (struct hankel_node *)(stack + 1);
     stack->values = (double complex(*)[2])(nodes + node_count);
-    stack->sources = (struct source *)(stack->values + node_count);
-    if (is_line) {
-        line_fill(b, stack->sources);
-    } else if (stack->source_count == 2) {
-        stack->sources[0] = (struct source){ 1.0, 0.5 };
-        stack->sources[1] = (struct source){ 1.0 + 2.0 * b, 0.5 };
+    if (stack->row.count > 0) {
+        row_fill(stack, (double *)(stack->values + node_count));
     } else {
         dipole_hankel_fill(&stack->hankel, nodes);
         nodes_fill(stack);
@@ -301,18 +268,25 @@ static double contour_sum(const dipole_stack *stack, dipole_face face, struct ha
     return sum;
 }
 
+/* The row of sources of what a face sends out; of the far face of a half-space nothing. */
+static double row_profile(const dipole_stack *stack, dipole_face face, double r_mm)
+{
+    if (face != DIPOLE_FACE_LIT)
+        return 0.0;
+    const double r = stack->row.count == 2 ? r_mm : fmax(r_mm, stack->r_floor_mm);
+    return dipole_row_value(&stack->row, r);
+}
+
 /* Rounding may leave a tiny negative number where the true value is next to nothing: it becomes 0. */
 static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
 {
     if (!(r_mm >= 0.0))
         return NAN;
-    if (isinf(r_mm) || (stack->source_count > 0 && face != DIPOLE_FACE_LIT))
+    if (stack->row.count > 0)
+        return row_profile(stack, face, r_mm);
+    if (isinf(r_mm))
         return 0.0;
-    if (stack->source_count == 2)
-        return source_sum(stack, dipole_lobe, false, r_mm) / (2.0 * PI);
     const double r = fmax(r_mm, stack->r_floor_mm);
-    if (stack->source_count > 0)
-        return source_sum(stack, dipole_lobe, false, r) / (2.0 * PI);
     return fmax(0.0, contour_sum(stack, face, dipole_hankel_range_for(&stack->hankel, r),
                                  dipole_hankel_profile_kernel, r));
 }
@@ -320,6 +294,10 @@ static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
 void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face, const double *r_mm,
                                   size_t count, double *values)
 {
+    if (stack->row.count == 2 && face == DIPOLE_FACE_LIT) {
+        dipole_row_profile(&stack->row, r_mm, count, values);
+        return;
+    }
     for (size_t i = 0; i < count; i++)
         values[i] = profile(stack, face, r_mm[i]);
 }
@@ -328,10 +306,13 @@ double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r
 {
     if (!(r_mm >= 0.0))
         return NAN;
-    if (isinf(r_mm) || (stack->source_count > 0 && face != DIPOLE_FACE_LIT))
+    if (stack->row.count > 0)
+        return face == DIPOLE_FACE_LIT
+                   ? fmin(stack->coefficients[0].alpha_prime * dipole_row_beyond(&stack->row, 1.0, r_mm),
+                          stack->total[face])
+                   : 0.0;
+    if (isinf(r_mm))
         return 0.0;
-    if (stack->source_count > 0)
-        return source_sum(stack, dipole_lobe_tail, true, r_mm);
     if (r_mm < stack->r_floor_mm)
         return stack->total[face];
     const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r_mm);
@@ -343,12 +324,13 @@ double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r
 {
     if (!(r_mm >= 0.0))
         return NAN;
-    if (stack->source_count > 0 && face != DIPOLE_FACE_LIT)
-        return 0.0;
+    if (stack->row.count > 0)
+        return face == DIPOLE_FACE_LIT
+                   ? fmin(stack->coefficients[0].alpha_prime * dipole_row_within(&stack->row, r_mm),
+                          stack->total[face])
+                   : 0.0;
     if (isinf(r_mm))
         return stack->total[face];
-    if (stack->source_count > 0)
-        return source_sum(stack, dipole_lobe_within, true, r_mm);
     if (r_mm < stack->r_floor_mm)
         return PI * r_mm * r_mm * profile(stack, face, r_mm);
     const double beyond = dipole_stack_beyond(stack, face, r_mm);
@@ -371,17 +353,10 @@ double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face fac
                                         { 0.90617984593866399280, 0.11846344252809454376 } };
     if (!(r_lo_mm >= 0.0 && r_hi_mm >= r_lo_mm))
         return NAN;
-    if (stack->source_count > 0 && face != DIPOLE_FACE_LIT)
-        return 0.0;
-    if (stack->source_count > 0 && r_hi_mm > r_lo_mm) {
-        const dipole_coefficients *const c = &stack->coefficients[0];
-        double sum = 0.0;
-        for (size_t k = 0; k < stack->source_count; k++)
-            sum += stack->sources[k].weight *
-                   dipole_lobe_ring_mean(stack->sources[k].depth * c->mean_free_path_mm, c->sigma_tr_per_mm,
-                                         r_lo_mm, r_hi_mm);
-        return c->alpha_prime / (2.0 * PI) * sum;
-    }
+    if (stack->row.count > 0)
+        return face == DIPOLE_FACE_LIT ? stack->coefficients[0].alpha_prime / (2.0 * PI) *
+                                             dipole_row_ring_mean(&stack->row, r_lo_mm, r_hi_mm)
+                                       : 0.0;
     if (r_hi_mm > 1.1 * r_lo_mm) {
         const double area_mm2 = PI * (r_hi_mm - r_lo_mm) * (r_hi_mm + r_lo_mm);
         const double within = dipole_stack_within(stack, face, r_hi_mm);
@@ -475,29 +450,6 @@ dipole_stack_gradient dipole_stack_total_gradient(const dipole_stack *stack, dip
     return gradient;
 }
 
-/* Of a row of sources, whose depths are multiples of the mean free path and whose weights are constant: as
- * T12. */
-static dipole_stack_gradient sources_gradient(const dipole_stack *stack, double r_mm)
-{
-    const dipole_coefficients *const c = &stack->coefficients[0];
-    double value = 0.0, d_log_z = 0.0, d_sigma_tr2 = 0.0;
-    for (size_t k = 0; k < stack->source_count; k++) {
-        const struct lobe_gradient g = dipole_lobe_differentiate(
-            stack->sources[k].depth * c->mean_free_path_mm, c->sigma_tr_per_mm, r_mm);
-        value += stack->sources[k].weight * g.value;
-        d_log_z += stack->sources[k].weight * g.d_log_z;
-        d_sigma_tr2 += stack->sources[k].weight * g.d_sigma_tr2;
-    }
-    const double scale = c->alpha_prime / (2.0 * PI), absorbed = c->sigma_a_per_mm * c->mean_free_path_mm;
-    return (dipole_stack_gradient){
-        .d_log_sigma_a =
-            scale * (3.0 * c->sigma_a_per_mm * (c->sigma_t_prime_per_mm + c->sigma_a_per_mm) * d_sigma_tr2 -
-                     absorbed * (value + d_log_z)),
-        .d_log_sigma_s_prime = scale * (absorbed * value - c->alpha_prime * d_log_z +
-                                        3.0 * c->sigma_a_per_mm * c->sigma_s_prime_per_mm * d_sigma_tr2),
-    };
-}
-
 void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, size_t layer,
                                    const double *r_mm, size_t count, dipole_stack_gradient *gradients)
 {
@@ -505,11 +457,14 @@ void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, 
         gradients[i] = (dipole_stack_gradient){ 0.0, 0.0, 0.0 };
         if (!(r_mm[i] >= 0.0))
             gradients[i] = (dipole_stack_gradient){ NAN, NAN, NAN };
-        else if (stack->source_count > 0 && face == DIPOLE_FACE_LIT && !isinf(r_mm[i]))
-            gradients[i] = sources_gradient(
-                stack, stack->source_count == 2 ? r_mm[i] : fmax(r_mm[i], stack->r_floor_mm));
+        else if (stack->row.count > 0 && face == DIPOLE_FACE_LIT) {
+            const double r = stack->row.count == 2 ? r_mm[i] : fmax(r_mm[i], stack->r_floor_mm);
+            double value;
+            dipole_row_gradient(&stack->row, &r, 1, &value, &gradients[i].d_log_sigma_a,
+                                &gradients[i].d_log_sigma_s_prime);
+        }
     }
-    if (stack->source_count > 0)
+    if (stack->row.count > 0)
         return;
     for (int parameter = 0; parameter < 3; parameter++) {
         struct system system;
