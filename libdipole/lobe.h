@@ -101,9 +101,9 @@ static inline double decay_deficit(double x)
 /* ---- where the source is seen from ---------------------------------------------------------------- */
 
 struct lobe_path {
-    double d, d_low, inverse; /* distance from the source and 1/d, mm and 1/mm */
-    double x;                 /* sigma_tr d                                    */
-    struct decay_parts decay; /* e^(-x)                                        */
+    double d, d2, inverse;    /* distance from the source, its square, and 1/d: mm, mm^2, 1/mm */
+    double x;                 /* sigma_tr d                                                    */
+    struct decay_parts decay; /* e^(-x)                                                        */
 };
 
 /* r >= 0, z > 0; r^2 = r2 + r2_low for r <= LOBE_FAR_MM */
@@ -118,7 +118,7 @@ static inline struct lobe_path lobe_path(struct dd z, struct dd sigma_tr, double
     const double x = sigma_tr.hi * d;
     const double x_low =
         product_error(sigma_tr.hi, d, x) + MULTIPLY_ADD(sigma_tr.hi, d_low, sigma_tr.lo * d);
-    return (struct lobe_path){ d, d_low, inverse, x, decay_split(x, x_low) };
+    return (struct lobe_path){ d, d2.hi, inverse, x, decay_split(x, x_low) };
 }
 
 static inline double lobe_distance(double r_mm)
@@ -146,7 +146,7 @@ static inline double lobe_value(struct dd z, struct dd sigma_tr, double r, struc
 {
     const struct lobe_path path = lobe_path(z, sigma_tr, r, r2);
     const double x = path.x > 1400.0 ? 1400.0 : path.x;
-    return decay_times((z.hi * path.inverse) * path.inverse * ((1.0 + x) * path.inverse), path.decay);
+    return decay_times(z.hi * (1.0 + x) / (path.d * path.d2), path.decay);
 }
 
 /* (z/d) e^(-sigma_tr d): the part beyond r. T8 */

@@ -37,10 +37,11 @@ static struct dd beam_b(const dipole_coefficients *c)
 
 size_t dipole_row_beam_count(const dipole_coefficients *c)
 {
+    /* b is below 500 with the exact Fdr, and below 2^54 where the polynomial is next to 1 */
     const double larger = fmax(1.0, beam_b(c).hi);
-    const int last = (int)ceil(log(45.0 * larger) / ROW_STEP);
-    assert(last - row_first < ROW_LIMIT); /* larger is below 400 for a legal eta */
-    return (size_t)(last - row_first + 1);
+    const int count = (int)ceil(log(45.0 * larger) / ROW_STEP) - row_first + 1;
+    assert(count <= ROW_LIMIT);
+    return (size_t)count;
 }
 
 void dipole_row_beam_fill(const dipole_coefficients *c, double *depth_mm, double *depth_low_mm,

@@ -9,7 +9,7 @@
 #include "dd.h"
 #include "libdipole/dipole.h"
 
-enum { ROW_LIMIT = 512 };
+enum { ROW_LIMIT = 768 };
 
 /* Distance of the beam model's sources in log depth. */
 #define ROW_STEP 0.125

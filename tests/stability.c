@@ -1,0 +1,313 @@
+/*
+ * The stability suite: hard inputs by the million, checked for what physics and dipole.h promise, and by
+ * the hundred thousand against high precision. Prints the tables of docs/stability.md; fails where a bound
+ * does not hold.
+ *
+ *   stability [SCALE]    SCALE times as many inputs, default 1
+ */
+#include "oracle.h"
+
+#include "check.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+static int failure_count;
+
+static void fail_input(const char *what, const dipole_coefficients *c, double r_mm, double found)
+{
+    if (failure_count++ < 20)
+        fprintf(stderr, "%s: sigma_a %.17g, sigma_s' %.17g, eta %.17g, r %.17g: found %.17g\n", what,
+                c->sigma_a_per_mm, c->sigma_s_prime_per_mm, c->eta, r_mm, found);
+}
+
+/* ---- inputs --------------------------------------------------------------------------------------- */
+
+/* sigma from 1e-12 to 1e6 per mm, or 0; alpha' toward 0 and 1; eta from 0.5 to 3, 1, and 1 +- 1e-12. */
+static dipole_coefficients random_medium(struct rng *rng)
+{
+    dipole_medium medium = { .sigma_a_per_mm = log_uniform(rng, 1e-12, 1e6),
+                             .sigma_s_prime_per_mm = log_uniform(rng, 1e-12, 1e6),
+                             .eta = log_uniform(rng, 0.5, 3.0) };
+    switch (random_bits(rng) % 16) {
+    case 0:
+        medium.sigma_a_per_mm = 0.0;
+        break;
+    case 1:
+        medium.sigma_s_prime_per_mm = 0.0;
+        break;
+    case 2:
+        medium.sigma_a_per_mm = medium.sigma_s_prime_per_mm * log_uniform(rng, 1e-17, 1e-3);
+        break;
+    case 3:
+        medium.sigma_s_prime_per_mm = medium.sigma_a_per_mm * log_uniform(rng, 1e-17, 1e-3);
+        break;
+    default:
+        break;
+    }
+    switch (random_bits(rng) % 16) {
+    case 0:
+        medium.eta = 1.0;
+        break;
+    case 1:
+        medium.eta = 1.0 + (random_bits(rng) % 2 ? 1e-12 : -1e-12);
+        break;
+    case 2:
+        medium.eta = random_bits(rng) % 2 ? 0.5 : 3.0;
+        break;
+    default:
+        break;
+    }
+    dipole_coefficients c;
+    dipole_status status;
+    if (!dipole_coefficients_init(&medium, &c, &status)) {
+        fprintf(stderr, "refused: %s\n", status.message);
+        failure_count++;
+    }
+    return c;
+}
+
+/* 0, anywhere from 1e-9 to 1e9 mm, or around the medium's own lengths up to where all light has faded. */
+static double random_distance(struct rng *rng, const dipole_coefficients *c)
+{
+    switch (random_bits(rng) % 8) {
+    case 0:
+        return 0.0;
+    case 1:
+    case 2:
+        return log_uniform(rng, 1e-9, 1e9);
+    case 3:
+        return c->sigma_tr_per_mm > 0.0 ? uniform(rng, 0.0, 800.0) / c->sigma_tr_per_mm : c->z_v_mm;
+    default:
+        return c->z_r_mm * log_uniform(rng, 1e-5, 1e5);
+    }
+}
+
+/* ---- what must hold for every input --------------------------------------------------------------- */
+
+static bool is_sound(double value)
+{
+    return isfinite(value) && value >= 0.0;
+}
+
+/* Never NaN, infinite or negative; falling with distance; parts add up to the whole; energy at most 1. The
+ * slack is a few roundings. */
+static void sweep_dipole(int count)
+{
+    struct rng rng = { .seed = 101 };
+    const double slack = 1.0 + 4e-15;
+    for (int i = 0; i < count; i++) {
+        const dipole_coefficients c = random_medium(&rng);
+        const double r = random_distance(&rng, &c), beyond_r = r * (1.0 + log_uniform(&rng, 1e-15, 1e3));
+        const double total = dipole_diffuse_reflectance(&c);
+        const double rd = dipole_rd_per_mm2(&c, r), rd_beyond = dipole_rd_per_mm2(&c, beyond_r);
+        const double within = dipole_reflectance_within(&c, r), tail = dipole_tail_fraction(&c, r);
+        const double ring = dipole_rd_ring_mean_per_mm2(&c, r, beyond_r);
+        const double spectrum = dipole_spectrum(&c, 1.0 / fmax(r, 1e-9));
+        const double epsilon = log_uniform(&rng, 1e-9, 0.999);
+        const dipole_derivative d = dipole_rd_derivative(&c, r);
+        double batch, d_log_a, d_log_s;
+        dipole_rd_profile_gradient(&c, &r, 1, &batch, &d_log_a, &d_log_s);
+        if (!is_sound(rd) || !(rd_beyond <= rd * slack) || !is_sound(batch))
+            fail_input("profile", &c, r, rd);
+        if (!is_sound(total) || total > 1.0)
+            fail_input("total", &c, r, total);
+        if (!is_sound(within) || within > total || dipole_reflectance_within(&c, beyond_r) < within / slack)
+            fail_input("within", &c, r, within);
+        if (!is_sound(tail) || tail > 1.0 || dipole_tail_fraction(&c, beyond_r) > tail * slack)
+            fail_input("tail", &c, r, tail);
+        if (fabs(within + tail * total - total) > 4e-15 * total)
+            fail_input("within + beyond", &c, r, within);
+        if (!is_sound(ring) || ring > rd * slack || ring < rd_beyond / slack)
+            fail_input("ring mean", &c, r, ring);
+        if (!is_sound(spectrum) || spectrum > total * slack)
+            fail_input("spectrum", &c, r, spectrum);
+        if (!isfinite(d.d_sigma_a) || !isfinite(d.d_sigma_s_prime) || !isfinite(d_log_a) ||
+            !isfinite(d_log_s))
+            fail_input("derivative", &c, r, d.d_sigma_a);
+        if (i % 16 == 0) {
+            const double r_max = dipole_r_max_mm(&c, epsilon);
+            if (!is_sound(r_max) || fabs(dipole_tail_fraction(&c, r_max) - epsilon) > 1e-11 * epsilon)
+                fail_input("r_max", &c, epsilon, r_max);
+            const double spacing = dipole_splat_spacing_mm(&c, epsilon);
+            if (!(isfinite(spacing) && spacing > 0.0))
+                fail_input("splat spacing", &c, epsilon, spacing);
+        }
+    }
+    printf(
+        "| dipole | %d | never NaN, infinite or negative; falling; within + beyond = total; energy ≤ 1 |\n",
+        count);
+}
+
+static void sweep_beam(int count)
+{
+    struct rng rng = { .seed = 102 };
+    const double slack = 1.0 + 1e-14;
+    for (int i = 0; i < count; i++) {
+        const dipole_coefficients c = random_medium(&rng);
+        const dipole_layer base = { { c.sigma_a_per_mm, c.sigma_s_prime_per_mm, c.eta, DIPOLE_FDR_EXACT },
+                                    (double)INFINITY };
+        dipole_stack *stack;
+        if (!dipole_stack_create(&base, 1, DIPOLE_MODEL_BEAM, DIPOLE_FROM_ABOVE, &stack, NULL)) {
+            fail_input("refused", &c, 0.0, 0.0);
+            continue;
+        }
+        const double total = dipole_stack_total(stack, DIPOLE_FACE_LIT);
+        if (!is_sound(total) || total > 1.0)
+            fail_input("beam, total", &c, 0.0, total);
+        for (int k = 0; k < 10; k++) {
+            const double r = random_distance(&rng, &c),
+                         beyond_r = r * (1.0 + log_uniform(&rng, 1e-15, 1e3));
+            const double radii[2] = { r, beyond_r };
+            double rd[2];
+            dipole_stack_gradient gradient;
+            dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, radii, 2, rd);
+            dipole_stack_profile_gradient(stack, DIPOLE_FACE_LIT, 0, radii, 1, &gradient);
+            const double within = dipole_stack_within(stack, DIPOLE_FACE_LIT, r);
+            const double beyond = dipole_stack_beyond(stack, DIPOLE_FACE_LIT, r);
+            const double ring = dipole_stack_ring_mean_per_mm2(stack, DIPOLE_FACE_LIT, r, beyond_r);
+            if (!is_sound(rd[0]) || rd[1] > rd[0] * slack)
+                fail_input("beam, profile", &c, r, rd[0]);
+            if (!is_sound(within) || !is_sound(beyond) || fabs(within + beyond - total) > 1e-14 * total)
+                fail_input("beam, within", &c, r, within);
+            if (!is_sound(ring))
+                fail_input("beam, ring mean", &c, r, ring);
+            if (!isfinite(gradient.d_log_sigma_a) || !isfinite(gradient.d_log_sigma_s_prime))
+                fail_input("beam, derivative", &c, r, gradient.d_log_sigma_a);
+        }
+        dipole_stack_destroy(stack);
+    }
+    printf("| beam, half-space | %d | the same |\n", 10 * count);
+}
+
+/* ---- units in the last place, against MPFR -------------------------------------------------------- */
+
+struct errors {
+    const char *name;
+    double bound; /* largest error allowed */
+    size_t count;
+    double *values;
+};
+
+static void errors_add(struct errors *errors, double error, const dipole_coefficients *c, double r_mm,
+                       double found)
+{
+    errors->values[errors->count++] = error;
+    if (!(error <= errors->bound)) {
+        char what[128];
+        snprintf(what, sizeof what, "%s is %.3g off", errors->name, error);
+        fail_input(what, c, r_mm, found);
+    }
+}
+
+static int compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void errors_print(struct errors *errors, const char *unit)
+{
+    qsort(errors->values, errors->count, sizeof *errors->values, compare);
+    printf("| %s | %zu | %.2g | %.2g | %.2g | %.2g | %s |\n", errors->name, errors->count,
+           errors->values[errors->count / 2], errors->values[errors->count / 100 * 99],
+           errors->values[errors->count - 1], errors->bound, unit);
+}
+
+enum { PROFILE, WITHIN, TAIL, TOTAL, RING, SPECTRUM, BY_SIGMA_A, BY_SIGMA_S, REACH, KIND_COUNT };
+
+/* |tail(r_max)/epsilon - 1| over the slope of log tail in log r: the relative error of r_max. */
+static double reach_error(struct oracle *o, double epsilon, double r_mm)
+{
+    oracle_tail(o, r_mm);
+    mpfr_t miss;
+    mpfr_init2(miss, ORACLE_BITS);
+    mpfr_sub_d(miss, o->sum, epsilon, MPFR_RNDN);
+    oracle_rd(o, r_mm); /* slope = 2 pi r^2 R_d/total, both without alpha' */
+    mpfr_div(o->sum, o->sum, o->alpha_prime, MPFR_RNDN);
+    mpfr_div(miss, miss, o->sum, MPFR_RNDN);
+    oracle_beyond(o, 0.0);
+    mpfr_mul(miss, miss, o->sum, MPFR_RNDN);
+    const double error = fabs(mpfr_get_d(miss, MPFR_RNDN)) / (4.0 * PI * r_mm * r_mm);
+    mpfr_clear(miss);
+    return error;
+}
+
+static void compare_dipole(int count)
+{
+    struct rng rng = { .seed = 103 };
+    struct errors all[KIND_COUNT] = {
+        [PROFILE] = { "profile", 8.0, 0, NULL },
+        [WITHIN] = { "within", 8.0, 0, NULL },
+        [TAIL] = { "tail", 8.0, 0, NULL },
+        [TOTAL] = { "total", 8.0, 0, NULL },
+        [RING] = { "ring mean", 8.0, 0, NULL },
+        [SPECTRUM] = { "spectrum", 8.0, 0, NULL },
+        [BY_SIGMA_A] = { "dRd/dσa", 64.0, 0, NULL },
+        [BY_SIGMA_S] = { "dRd/dσ's", 64.0, 0, NULL },
+        [REACH] = { "r_max, relative", 1e-12, 0, NULL },
+    };
+    for (int k = 0; k < KIND_COUNT; k++)
+        all[k].values = calloc((size_t)count, sizeof(double));
+    for (int i = 0; i < count; i++) {
+        const dipole_coefficients c = random_medium(&rng);
+        const double r = random_distance(&rng, &c), r_hi = r * (1.0 + log_uniform(&rng, 1e-12, 1e2));
+        const double k = 1.0 / fmax(r, 1e-9), epsilon = log_uniform(&rng, 1e-12, 0.999);
+        const dipole_derivative d = dipole_rd_derivative(&c, r);
+        struct oracle o;
+        oracle_init(&o, &c);
+        double found = dipole_rd_per_mm2(&c, r);
+        oracle_rd(&o, r);
+        errors_add(&all[PROFILE], oracle_ulp(&o, found), &c, r, found);
+        found = dipole_reflectance_within(&c, r);
+        oracle_between(&o, 0.0, r);
+        errors_add(&all[WITHIN], oracle_ulp(&o, found), &c, r, found);
+        found = dipole_tail_fraction(&c, r);
+        oracle_tail(&o, r);
+        errors_add(&all[TAIL], oracle_ulp(&o, found), &c, r, found);
+        found = dipole_diffuse_reflectance(&c);
+        oracle_between(&o, 0.0, -1.0);
+        errors_add(&all[TOTAL], oracle_ulp(&o, found), &c, r, found);
+        if (r > 0.0 && r_hi > r) {
+            found = dipole_rd_ring_mean_per_mm2(&c, r, r_hi);
+            oracle_ring_mean(&o, r, r_hi);
+            errors_add(&all[RING], oracle_ulp(&o, found), &c, r, found);
+        }
+        found = dipole_spectrum(&c, k);
+        oracle_spectrum(&o, k);
+        errors_add(&all[SPECTRUM], oracle_ulp(&o, found), &c, k, found);
+        oracle_derivative(&o, &c, true, r);
+        errors_add(&all[BY_SIGMA_A], oracle_ulp(&o, d.d_sigma_a), &c, r, d.d_sigma_a);
+        oracle_derivative(&o, &c, false, r);
+        errors_add(&all[BY_SIGMA_S], oracle_ulp(&o, d.d_sigma_s_prime), &c, r, d.d_sigma_s_prime);
+        if (c.sigma_s_prime_per_mm > 0.0) {
+            found = dipole_r_max_mm(&c, epsilon);
+            errors_add(&all[REACH], reach_error(&o, epsilon, found), &c, epsilon, found);
+        }
+        oracle_clear(&o);
+    }
+    for (int k = 0; k < KIND_COUNT; k++) {
+        errors_print(&all[k], k == REACH ? "1" : "ULP");
+        free(all[k].values);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const double scale = argc > 1 ? strtod(argv[1], NULL) : 1.0;
+    if (!(scale > 0.0 && scale <= 1000.0)) {
+        fprintf(stderr, "usage: stability [SCALE], more than 0 to 1000\n");
+        return 2;
+    }
+    printf("| model | inputs | held |\n|---|---|---|\n");
+    sweep_dipole((int)(1e6 * scale));
+    sweep_beam((int)(2e4 * scale));
+    printf(
+        "\n| quantity | inputs | median | 99 %% | worst | bound | unit |\n|---|---|---|---|---|---|---|\n");
+    compare_dipole((int)(1e5 * scale));
+    printf("\n%d failures\n", failure_count);
+    mpfr_free_cache();
+    return failure_count > 0;
+}
