@@ -320,6 +320,46 @@ DIPOLE_API void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_
                                               const double *r_mm, size_t count,
                                               dipole_stack_gradient *gradients);
 
+/* ---- between two points of a surface ------------------------------------------------------------ */
+
+/*
+ * Where light enters a surface that is not flat, sources stand under that point, against the normal, and
+ * their images above it; what arrives at another point follows from its distance to each. Translucent
+ * shadow maps sum over these. theory.md T30.
+ */
+typedef struct dipole_source {
+    double depth_mm; /* under the surface; negative for an image above it */
+    double weight;   /* alpha' times the part of the light; all add up to at most 1 */
+} dipole_source;
+
+enum { DIPOLE_SOURCE_LIMIT = 128 };
+
+/*
+ * The sources of a model: two of the dipole, pairs of depth z and -z of the beam model, whose line of
+ * sources becomes a short sum.
+ *
+ *   epsilon   largest relative error of the profile over a flat surface from r_min_mm on, 1e-9 to 0.1; the
+ *             total is exact. The dipole has no error.
+ *   r_min_mm  from 1e-6 mean free paths on; the beam model has an integrable logarithm at 0
+ *   returns   how many of *out are filled, 2 to DIPOLE_SOURCE_LIMIT; 0 with DIPOLE_NOT_SUPPORTED (other
+ *             models) or DIPOLE_BAD_VALUE
+ */
+DIPOLE_API DIPOLE_CHECKED size_t dipole_sources_init(const dipole_coefficients *coefficients,
+                                                     dipole_model model, double epsilon, double r_min_mm,
+                                                     dipole_source out[DIPOLE_SOURCE_LIMIT],
+                                                     dipole_status *status);
+
+/*
+ * Power that leaves per mm^2 at out_mm for one unit that enters at in_mm through a surface with the unit
+ * normal in_normal, in 1/mm^2. Over a flat surface it is the profile. Where the shape is thin or concave a
+ * point can lie next to a source, and the profile would have no bound: no source is taken to be nearer than
+ * its own depth. What that does to the energy is in theory.md T30.
+ */
+DIPOLE_API double dipole_rd_between_per_mm2(const dipole_coefficients *coefficients,
+                                            const dipole_source *sources, size_t count,
+                                            const double in_mm[3], const double in_normal[3],
+                                            const double out_mm[3]);
+
 /* ---- media from reflectance and a length -------------------------------------------------------- */
 
 /*

@@ -44,12 +44,21 @@ size_t dipole_row_beam_count(const dipole_coefficients *c)
     return (size_t)count;
 }
 
-void dipole_row_beam_fill(const dipole_coefficients *c, double *depth_mm, double *depth_low_mm,
-                          double *weight)
+/* The slower decay is taken out, so that b = 1 is no case of its own. */
+double dipole_row_beam_weight(const dipole_coefficients *c, double x, double d_log_x)
 {
     const struct dd b = beam_b(c), one = { 1.0, 0.0 };
     const struct dd larger = b.hi > 1.0 ? b : one, smaller = b.hi > 1.0 ? one : b;
     const struct dd rate = dd_divide(dd_add(larger, dd_negate(smaller)), dd_multiply(larger, smaller));
+    int exponent;
+    const struct dd decay = dd_decay(dd_divide((struct dd){ x, 0.0 }, larger), &exponent);
+    return d_log_x * x * (x / (larger.hi * smaller.hi)) * decay_mean(x * rate.hi) *
+           ldexp(decay.hi, exponent);
+}
+
+void dipole_row_beam_fill(const dipole_coefficients *c, double *depth_mm, double *depth_low_mm,
+                          double *weight)
+{
     const struct dd length = { c->z_r_mm, c->z_r_low_mm };
     const size_t count = dipole_row_beam_count(c);
     for (size_t k = 0; k < count; k++) {
@@ -57,11 +66,7 @@ void dipole_row_beam_fill(const dipole_coefficients *c, double *depth_mm, double
         const struct dd z = dd_scale(x, length);
         depth_mm[k] = z.hi;
         depth_low_mm[k] = z.lo;
-        /* w(x) x step; the slower decay is taken out, so that b = 1 is no case of its own */
-        int exponent;
-        const struct dd decay = dd_decay(dd_divide((struct dd){ x, 0.0 }, larger), &exponent);
-        weight[k] = ROW_STEP * x * (x / (larger.hi * smaller.hi)) * decay_mean(x * rate.hi) *
-                    ldexp(decay.hi, exponent);
+        weight[k] = dipole_row_beam_weight(c, x, ROW_STEP);
     }
 }
 

@@ -28,6 +28,8 @@ struct row_of_two {
 };
 void dipole_row_of_two_init(const dipole_coefficients *coefficients, struct row_of_two *out);
 
+/* w(x) dx of the beam model's line of sources at depth x mean free paths, dx = x d log x. T22 */
+double dipole_row_beam_weight(const dipole_coefficients *coefficients, double x, double d_log_x);
 /* How many sources the beam model needs, at most ROW_LIMIT; and to fill that many. T22 */
 size_t dipole_row_beam_count(const dipole_coefficients *coefficients);
 void dipole_row_beam_fill(const dipole_coefficients *coefficients, double *depth_mm, double *depth_low_mm,
