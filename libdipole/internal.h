@@ -60,10 +60,13 @@ struct lobe_gradient dipole_lobe_differentiate(double z_mm, double sigma_tr_per_
 
 /* ---- one spatial frequency of a stack (layers.c) -------------------------------------------------- */
 
+enum { SLAB_MOMENTS = 16 };
+
 struct slab {
     struct dual sigma_s_prime, sigma_t_prime, diffusion, sigma_tr2, thickness;
     struct dual down, up; /* beams entering from above and from below, per unit that entered the stack */
     struct dual through;  /* e^(-sigma_t' thickness)                                                  */
+    struct dual near_moments[SLAB_MOMENTS], far_moments[SLAB_MOMENTS]; /* of the fading beam            */
 };
 
 struct system {
