@@ -289,6 +289,8 @@ double dipole_system_first_singularity_per_mm(const struct system *system)
     for (size_t i = 0; i < system->count; i++)
         lo = fmin(lo, sqrt(creal(system->slabs[i].sigma_tr2.v)));
     double hi = sqrt(creal(system->slabs[system->count - 1].sigma_tr2.v));
+    if (system->is_half_space && is_below_first_singularity(system, hi))
+        return hi; /* the base's cut */
     if (!system->is_half_space) {
         hi = fmax(2.0 * lo, creal(system->slabs[0].sigma_t_prime.v));
         while (is_below_first_singularity(system, hi))

@@ -25,9 +25,8 @@ struct dipole_stack {
     double r_floor_mm;               /* below it the profile goes on as a constant */
     double total[2], unscattered[2]; /* by dipole_face */
     size_t source_count;
-    struct source *sources; /* into the same allocation, as are the rest */
-    struct hankel hankel;
-    double complex (*values)[2]; /* weight x response of each node, by dipole_face */
+    struct source *sources;  /* into the same allocation, as are the rest */
+    struct hankel hankel[2]; /* by dipole_face; of models that are no row of sources */
 };
 
 /* ---- a half-space as a row of sources (T22) ------------------------------------------------------- */
@@ -145,6 +144,20 @@ static bool coefficients_fill(dipole_stack *stack, dipole_status *status)
     return true;
 }
 
+/* sigma_tr of a layer as the model has it. */
+static double layer_sigma_tr_per_mm(const dipole_stack *stack, size_t i, dipole_model model)
+{
+    const dipole_coefficients *const c = &stack->coefficients[i];
+    const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
+    return model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
+                                               : c->sigma_tr_per_mm;
+}
+
+static double base_sigma_tr_per_mm(const dipole_stack *stack, dipole_model model)
+{
+    return layer_sigma_tr_per_mm(stack, stack->count - 1, model);
+}
+
 /* Where R^ and T^ begin to be singular. Of the papers' models only a lower bound is known: the smallest
  * sigma_tr of a layer. */
 static double singularity_per_mm(const dipole_stack *stack, dipole_model model)
@@ -152,24 +165,17 @@ static double singularity_per_mm(const dipole_stack *stack, dipole_model model)
     if (model == DIPOLE_MODEL_BEAM)
         return dipole_system_first_singularity_per_mm(&stack->system);
     double smallest = INFINITY;
-    for (size_t i = 0; i < stack->count; i++) {
-        const dipole_coefficients *const c = &stack->coefficients[i];
-        const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
-        smallest =
-            fmin(smallest, model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
-                                                               : c->sigma_tr_per_mm);
-    }
+    for (size_t i = 0; i < stack->count; i++)
+        smallest = fmin(smallest, layer_sigma_tr_per_mm(stack, i, model));
     return smallest;
 }
 
-static void lengths_find(const dipole_stack *stack, double *shortest_mm, double *longest_mm)
+static double shortest_length_mm(const dipole_stack *stack)
 {
-    *shortest_mm = INFINITY;
-    *longest_mm = 0.0;
-    for (size_t i = 0; i < stack->count; i++) {
-        *shortest_mm = fmin(*shortest_mm, stack->coefficients[i].mean_free_path_mm);
-        *longest_mm = fmax(*longest_mm, stack->coefficients[i].mean_free_path_mm);
-    }
+    double shortest = INFINITY;
+    for (size_t i = 0; i < stack->count; i++)
+        shortest = fmin(shortest, stack->coefficients[i].mean_free_path_mm);
+    return shortest;
 }
 
 static void totals_fill(dipole_stack *stack, dipole_model model)
@@ -183,15 +189,43 @@ static void totals_fill(dipole_stack *stack, dipole_model model)
     }
 }
 
-static void nodes_fill(dipole_stack *stack)
+static double complex response_lit(const void *context, double complex k2)
 {
-    for (size_t j = 0; j < stack->hankel.node_count; j++) {
-        const struct hankel_node *const node = &stack->hankel.nodes[j];
-        struct dual f[2];
-        stack->response(&stack->system, -node->kappa * node->kappa, f);
-        for (int face = 0; face < 2; face++)
-            stack->values[j][face] = node->weight * f[face].v;
+    const dipole_stack *const stack = context;
+    struct dual f[2];
+    stack->response(&stack->system, k2, f);
+    return f[DIPOLE_FACE_LIT].v;
+}
+
+static double complex response_far(const void *context, double complex k2)
+{
+    const dipole_stack *const stack = context;
+    struct dual f[2];
+    stack->response(&stack->system, k2, f);
+    return f[DIPOLE_FACE_FAR].v;
+}
+
+/* Everything but a row of sources: lay out and fill the contours of both faces. */
+static bool hankels_init(dipole_stack *stack, dipole_model model)
+{
+    static hankel_function *const responses[2] = { response_lit, response_far };
+    const size_t last = stack->count - 1;
+    const bool is_half_space = isinf(stack->layers[last].thickness_mm);
+    struct hankel_input input = {
+        .context = stack,
+        .singularity_per_mm = singularity_per_mm(stack, model),
+        .r_min_mm = stack->r_floor_mm,
+        .extent_mm = is_half_space ? stack->coefficients[last].mean_free_path_mm : 0.0,
+    };
+    for (size_t i = 0; i < stack->count; i++)
+        input.extent_mm += i < last || !is_half_space ? stack->layers[i].thickness_mm : 0.0;
+    input.is_cut = is_half_space && input.singularity_per_mm == base_sigma_tr_per_mm(stack, model);
+    for (int face = 0; face < 2; face++) {
+        input.response = responses[face];
+        if (!dipole_hankel_init(&stack->hankel[face], &input))
+            return false;
     }
+    return true;
 }
 
 bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model model, dipole_side side,
@@ -215,9 +249,7 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
     dipole_system_init(&draft.system, draft.layers, draft.coefficients, count, -1);
     totals_fill(&draft, model);
 
-    double shortest_mm, longest_mm;
-    lengths_find(&draft, &shortest_mm, &longest_mm);
-    draft.r_floor_mm = 1e-9 * shortest_mm;
+    draft.r_floor_mm = 1e-9 * shortest_length_mm(&draft);
     const double b = 2.0 / 3.0 * draft.coefficients[0].boundary_a;
     const bool is_half_space = count == 1 && isinf(layers[0].thickness_mm);
     const bool is_line = is_half_space && model == DIPOLE_MODEL_BEAM;
@@ -225,27 +257,20 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
         draft.source_count = line_fill(b, NULL);
     else if (is_half_space && model != DIPOLE_MODEL_BETTER_DIPOLE)
         draft.source_count = 2;
-    else
-        dipole_hankel_plan(&draft.hankel, singularity_per_mm(&draft, model), draft.r_floor_mm, longest_mm);
 
-    const size_t node_count = draft.hankel.node_count;
-    dipole_stack *const stack =
-        malloc(sizeof *stack + node_count * (sizeof *stack->hankel.nodes + sizeof *stack->values) +
-               draft.source_count * sizeof *stack->sources);
+    dipole_stack *const stack = malloc(sizeof *stack + draft.source_count * sizeof *stack->sources);
     if (stack == NULL)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
     *stack = draft;
-    struct hankel_node *const nodes = (struct hankel_node *)(stack + 1);
-    stack->values = (double complex(*)[2])(nodes + node_count);
-    stack->sources = (struct source *)(stack->values + node_count);
+    stack->sources = (struct source *)(stack + 1);
     if (is_line) {
         line_fill(b, stack->sources);
     } else if (stack->source_count == 2) {
         stack->sources[0] = (struct source){ 1.0, 0.5 };
         stack->sources[1] = (struct source){ 1.0 + 2.0 * b, 0.5 };
-    } else {
-        dipole_hankel_fill(&stack->hankel, nodes);
-        nodes_fill(stack);
+    } else if (!hankels_init(stack, model)) {
+        dipole_stack_destroy(stack);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
     }
     *stack_out = stack;
     return true;
@@ -253,6 +278,10 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
 
 void dipole_stack_destroy(dipole_stack *stack)
 {
+    if (stack == NULL)
+        return;
+    for (int face = 0; face < 2; face++)
+        dipole_hankel_clear(&stack->hankel[face]);
     free(stack);
 }
 
@@ -292,15 +321,6 @@ double dipole_stack_spectrum(const dipole_stack *stack, dipole_face face, double
     return fmax(creal(f[face].v), 0.0);
 }
 
-static double contour_sum(const dipole_stack *stack, dipole_face face, struct hankel_range range,
-                          double complex (*kernel)(double complex, double), double r_mm)
-{
-    double sum = 0.0;
-    for (size_t j = range.first; j < range.first + range.count; j++)
-        sum += cimag(stack->values[j][face] * kernel(stack->hankel.nodes[j].kappa, r_mm));
-    return sum;
-}
-
 /* Rounding may leave a tiny negative number where the true value is next to nothing: it becomes 0. */
 static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
 {
@@ -313,8 +333,7 @@ static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
     const double r = fmax(r_mm, stack->r_floor_mm);
     if (stack->source_count > 0)
         return source_sum(stack, dipole_lobe, false, r) / (2.0 * PI);
-    return fmax(0.0, contour_sum(stack, face, dipole_hankel_range_for(&stack->hankel, r),
-                                 dipole_hankel_profile_kernel, r));
+    return fmax(0.0, dipole_hankel_profile(&stack->hankel[face], r));
 }
 
 void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face, const double *r_mm,
@@ -334,9 +353,7 @@ double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r
         return source_sum(stack, dipole_lobe_tail, true, r_mm);
     if (r_mm < stack->r_floor_mm)
         return stack->total[face];
-    const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r_mm);
-    return fmax(0.0, dipole_hankel_start_share(&stack->hankel) * stack->total[face] +
-                         contour_sum(stack, face, range, dipole_hankel_beyond_kernel, r_mm));
+    return fmin(stack->total[face], fmax(0.0, dipole_hankel_beyond(&stack->hankel[face], r_mm)));
 }
 
 double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r_mm)
@@ -354,9 +371,7 @@ double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r
     const double beyond = dipole_stack_beyond(stack, face, r_mm);
     if (beyond < 0.5 * stack->total[face])
         return stack->total[face] - beyond;
-    return fmax(0.0,
-                fmin(stack->total[face], contour_sum(stack, face, dipole_hankel_range_all(&stack->hankel),
-                                                     dipole_hankel_within_kernel, r_mm)));
+    return fmin(stack->total[face], fmax(0.0, dipole_hankel_within(&stack->hankel[face], r_mm)));
 }
 
 /* The mean over a wide ring from the power beyond its edges; over a narrow one, where that would cancel, by
@@ -498,6 +513,40 @@ static dipole_stack_gradient sources_gradient(const dipole_stack *stack, double 
     };
 }
 
+/* Adds what the nodes of one contour give to the gradients at those radii that it serves. Each node is
+ * solved once per parameter and its kernel evaluated once per radius. */
+static void contour_gradient(const dipole_stack *stack, const struct system systems[3], dipole_face face,
+                             const struct hankel_contour *contour, const double *r_mm, size_t count,
+                             dipole_stack_gradient *gradients)
+{
+    const struct hankel *const hankel = &stack->hankel[face];
+    for (size_t j = contour->first; j < contour->first + contour->count; j++) {
+        const struct hankel_node *const node = &hankel->nodes[j];
+        double complex terms[3];
+        bool is_solved = false;
+        for (size_t i = 0; i < count; i++) {
+            if (!(r_mm[i] >= 0.0) || isinf(r_mm[i]))
+                continue;
+            const double r = fmin(fmax(r_mm[i], stack->r_floor_mm), hankel->r_far_mm);
+            if (dipole_hankel_contour_for(hankel, r) != contour ||
+                !dipole_hankel_is_needed(contour, node, r))
+                continue;
+            for (int parameter = 0; !is_solved && parameter < 3; parameter++) {
+                struct dual f[2];
+                stack->response(&systems[parameter], -node->kappa * node->kappa, f);
+                terms[parameter] = contour->angle > 0.0 ? node->weight * f[face].d
+                                                        : I * (creal(node->weight) * cimag(f[face].d));
+            }
+            is_solved = true;
+            const double complex kernel = dipole_bessel_k0(node->kappa * r, node->log_kappa + log(r)) *
+                                          dipole_hankel_far_factor(hankel, r_mm[i]);
+            gradients[i].d_log_sigma_a += cimag(terms[0] * kernel);
+            gradients[i].d_log_sigma_s_prime += cimag(terms[1] * kernel);
+            gradients[i].d_log_thickness += cimag(terms[2] * kernel);
+        }
+    }
+}
+
 void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, size_t layer,
                                    const double *r_mm, size_t count, dipole_stack_gradient *gradients)
 {
@@ -511,23 +560,11 @@ void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, 
     }
     if (stack->source_count > 0)
         return;
-    for (int parameter = 0; parameter < 3; parameter++) {
-        struct system system;
-        dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
+    struct system systems[3];
+    for (int parameter = 0; parameter < 3; parameter++)
+        dipole_system_init(&systems[parameter], stack->layers, stack->coefficients, stack->count,
                            3 * (int)place(stack, layer) + parameter);
-        for (size_t i = 0; i < count; i++) {
-            if (!(r_mm[i] >= 0.0) || isinf(r_mm[i]))
-                continue;
-            const double r = fmax(r_mm[i], stack->r_floor_mm);
-            const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r);
-            double sum = 0.0;
-            for (size_t j = range.first; j < range.first + range.count; j++) {
-                const struct hankel_node *const node = &stack->hankel.nodes[j];
-                struct dual f[2];
-                stack->response(&system, -node->kappa * node->kappa, f);
-                sum += cimag(node->weight * f[face].d * dipole_hankel_profile_kernel(node->kappa, r));
-            }
-            gradient_set(&gradients[i], parameter, sum);
-        }
-    }
+    const struct hankel *const hankel = &stack->hankel[face];
+    for (size_t i = 0; i < hankel->contour_count; i++)
+        contour_gradient(stack, systems, face, &hankel->contours[i], r_mm, count, gradients);
 }
