@@ -39,7 +39,7 @@ static inline void oracle_precision_set(struct layers_oracle *o, size_t unknowns
 {
     o->unknowns = unknowns;
     for (size_t i = 0; i < unknowns; i++)
-        for (size_t j = 0; j <= unknowns; j++) {
+        for (size_t j = i > 9 ? i - 9 : 0; j <= unknowns; j = j < unknowns && j == i + 9 ? unknowns : j + 1) {
             mpfr_set_prec(o->rows[i][j], bits);
             mpfr_set_zero(o->rows[i][j], 1);
         }
@@ -62,7 +62,7 @@ static inline void oracle_solve(struct layers_oracle *o)
         for (size_t i = k + 1; i < n && i <= k + 3; i++)
             if (mpfr_cmpabs(o->rows[i][k], o->rows[pivot][k]) > 0)
                 pivot = i;
-        for (size_t j = k; pivot != k && j <= n; j++)
+        for (size_t j = k; pivot != k && j <= n; j = j < n && j == k + 6 ? n : j + 1)
             mpfr_swap(o->rows[k][j], o->rows[pivot][j]);
         for (size_t i = k + 1; i < n && i <= k + 3; i++) {
             if (mpfr_zero_p(o->rows[i][k]))
@@ -188,7 +188,8 @@ static inline void layers_oracle_clear(struct layers_oracle *o)
     mpfr_clears(o->a, o->b, o->c, (mpfr_ptr)0);
 }
 
-/* Bits for 1e-60 of T^: what e^(-qd) takes away, and what thin layers do, where the two solutions meet. */
+/* Enough bits for T^ down to 1e-300 to be right to 1e-60: what e^(-qd) takes away, and what thin layers do,
+ * where the two solutions of a layer meet. */
 static inline mpfr_prec_t oracle_bits(const struct layers_oracle *o, double k)
 {
     double bits = 320.0, depth = 0.0;
@@ -200,7 +201,7 @@ static inline mpfr_prec_t oracle_bits(const struct layers_oracle *o, double k)
         depth += q * o->layers[i].thickness_mm;
         bits += 2.0 * fmax(0.0, -log2(q * o->layers[i].thickness_mm));
     }
-    return (mpfr_prec_t)(bits + 3.0 * fmin(depth, 1500.0));
+    return (mpfr_prec_t)(bits + 1.5 * fmin(depth, 750.0));
 }
 
 /*
