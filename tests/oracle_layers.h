@@ -2,7 +2,8 @@
  * The beam model of layers (theory.md T23) in MPFR, by the textbook: in each layer phi = C e^(-qz) +
  * E e^(-q(d - z)) + particular solution, all conditions in one banded system, Gaussian elimination with
  * pivoting; the beams from a linear system of their own. Nothing is rearranged against cancellation: the
- * precision is raised until it does not matter. A is taken from the library (test_fresnel.c has its oracle).
+ * precision is raised until it does not matter. A is taken from the library (test_fresnel.c has its
+ * oracle).
  *
  * Profiles from it: R^ and T^ along the real k axis, interpolated by polynomials on each octave, are
  * integrated against J_0(kr) k between the zeros of J_0, and the sums accelerated by Wynn's algorithm.
@@ -18,6 +19,17 @@
 #include <stdlib.h>
 
 enum { ORACLE_UNKNOWNS = 2 * DIPOLE_LAYER_LIMIT };
+enum {
+    ORACLE_Q,
+    ORACLE_SIGMA_T,
+    ORACLE_DQ,
+    ORACLE_D_SIGMA_T,
+    ORACLE_FADE_Q,
+    ORACLE_FADE_T,
+    ORACLE_DOWN,
+    ORACLE_UP,
+    ORACLE_LAYER_NUMBERS
+};
 
 struct layers_oracle {
     size_t count;
@@ -29,7 +41,9 @@ struct layers_oracle {
     /* a system of equations, its right side in column `unknowns`, and scratch */
     size_t unknowns;
     mpfr_t rows[ORACLE_UNKNOWNS][ORACLE_UNKNOWNS + 1];
-    mpfr_t q[DIPOLE_LAYER_LIMIT], diffusion[DIPOLE_LAYER_LIMIT], sigma_t[DIPOLE_LAYER_LIMIT];
+    /* of each layer q, sigma_t', D q, D sigma_t', e^(-qd), e^(-sigma_t' d), amplitudes of what the beams
+     * cause */
+    mpfr_t layer[DIPOLE_LAYER_LIMIT][ORACLE_LAYER_NUMBERS];
     mpfr_t a, b, c;
 };
 
@@ -39,21 +53,21 @@ static inline void oracle_precision_set(struct layers_oracle *o, size_t unknowns
 {
     o->unknowns = unknowns;
     for (size_t i = 0; i < unknowns; i++)
-        for (size_t j = i > 9 ? i - 9 : 0; j <= unknowns; j = j < unknowns && j == i + 9 ? unknowns : j + 1) {
+        for (size_t j = i > 9 ? i - 9 : 0; j <= unknowns;
+             j = j < unknowns && j == i + 9 ? unknowns : j + 1) {
             mpfr_set_prec(o->rows[i][j], bits);
             mpfr_set_zero(o->rows[i][j], 1);
         }
-    for (size_t i = 0; i < DIPOLE_LAYER_LIMIT; i++) {
-        mpfr_set_prec(o->q[i], bits);
-        mpfr_set_prec(o->diffusion[i], bits);
-        mpfr_set_prec(o->sigma_t[i], bits);
-    }
+    for (size_t i = 0; i < o->count; i++)
+        for (int k = 0; k < ORACLE_LAYER_NUMBERS; k++)
+            mpfr_set_prec(o->layer[i][k], bits);
     mpfr_set_prec(o->a, bits);
     mpfr_set_prec(o->b, bits);
     mpfr_set_prec(o->c, bits);
 }
 
-/* Gauss; no entry is farther than 3 from the diagonal, 6 after swaps. The solution ends in the right side. */
+/* Gauss; no entry is farther than 3 from the diagonal, 6 after swaps. The solution ends in the right side.
+ */
 static inline void oracle_solve(struct layers_oracle *o)
 {
     const size_t n = o->unknowns;
@@ -106,8 +120,9 @@ static inline void oracle_through(const struct layers_oracle *o, size_t i, mpfr_
 }
 
 /*
- * Unknowns down_0, up_0, down_1, ...: at an interface with reflectance r, arriving from above and below with
- * a = down_i through_i and b = up_(i+1) through_(i+1), down_(i+1) = (1 - r) a + r b, up_i = r a + (1 - r) b.
+ * Unknowns down_0, up_0, down_1, ...: at an interface with reflectance r, arriving from above and below
+ * with a = down_i through_i and b = up_(i+1) through_(i+1), down_(i+1) = (1 - r) a + r b, up_i = r a + (1 -
+ * r) b.
  */
 static inline void oracle_beams(struct layers_oracle *o)
 {
@@ -172,8 +187,11 @@ static inline void layers_oracle_init(struct layers_oracle *o, const dipole_laye
     for (size_t i = 0; i < ORACLE_UNKNOWNS; i++)
         for (size_t j = 0; j <= ORACLE_UNKNOWNS; j++)
             mpfr_init2(o->rows[i][j], 64);
-    for (size_t i = 0; i < DIPOLE_LAYER_LIMIT; i++)
-        mpfr_inits2(512, o->q[i], o->diffusion[i], o->sigma_t[i], o->down[i], o->up[i], (mpfr_ptr)0);
+    for (size_t i = 0; i < DIPOLE_LAYER_LIMIT; i++) {
+        mpfr_inits2(512, o->down[i], o->up[i], (mpfr_ptr)0);
+        for (int k = 0; k < ORACLE_LAYER_NUMBERS; k++)
+            mpfr_init2(o->layer[i][k], 64);
+    }
     mpfr_inits2(512, o->a, o->b, o->c, (mpfr_ptr)0);
     oracle_beams(o);
 }
@@ -183,8 +201,11 @@ static inline void layers_oracle_clear(struct layers_oracle *o)
     for (size_t i = 0; i < ORACLE_UNKNOWNS; i++)
         for (size_t j = 0; j <= ORACLE_UNKNOWNS; j++)
             mpfr_clear(o->rows[i][j]);
-    for (size_t i = 0; i < DIPOLE_LAYER_LIMIT; i++)
-        mpfr_clears(o->q[i], o->diffusion[i], o->sigma_t[i], o->down[i], o->up[i], (mpfr_ptr)0);
+    for (size_t i = 0; i < DIPOLE_LAYER_LIMIT; i++) {
+        mpfr_clears(o->down[i], o->up[i], (mpfr_ptr)0);
+        for (int k = 0; k < ORACLE_LAYER_NUMBERS; k++)
+            mpfr_clear(o->layer[i][k]);
+    }
     mpfr_clears(o->a, o->b, o->c, (mpfr_ptr)0);
 }
 
@@ -195,7 +216,8 @@ static inline mpfr_prec_t oracle_bits(const struct layers_oracle *o, double k)
     double bits = 320.0, depth = 0.0;
     for (size_t i = 0; i < o->count; i++) {
         const dipole_medium *const m = &o->layers[i].medium;
-        const double q = sqrt(k * k + 3.0 * m->sigma_a_per_mm * (m->sigma_a_per_mm + m->sigma_s_prime_per_mm));
+        const double q =
+            sqrt(k * k + 3.0 * m->sigma_a_per_mm * (m->sigma_a_per_mm + m->sigma_s_prime_per_mm));
         if (isinf(o->layers[i].thickness_mm))
             continue;
         depth += q * o->layers[i].thickness_mm;
@@ -204,44 +226,27 @@ static inline mpfr_prec_t oracle_bits(const struct layers_oracle *o, double k)
     return (mpfr_prec_t)(bits + 1.5 * fmin(depth, 750.0));
 }
 
-/*
- * Adds layer i's part of a condition to a row: coefficient_phi phi + coefficient_flux D phi' at its top
- * (z = 0) or bottom, with the particular solution on the right side. Coefficients are doubles.
+/* Adds coefficient_phi phi + coefficient_flux D phi' at the top or bottom of a layer to a row: what C (way
+ * 0, decaying downwards) or E (way 1, upwards) contributes, and the particular solution on the right side.
  */
 static inline void oracle_condition(struct layers_oracle *o, size_t row, size_t i, bool is_bottom,
                                     double coefficient_phi, double coefficient_flux)
 {
     const size_t n = o->unknowns;
-    const bool is_infinite = isinf(o->layers[i].thickness_mm);
-    const double d = o->layers[i].thickness_mm;
-    for (int way = 0; way < 2 && !(is_infinite && way == 1); way++) { /* C decays downwards, E upwards */
-        const bool is_far = is_bottom == (way == 0); /* e^(-qd) away from where the solution is 1 */
-        /* homogeneous: phi = x, D phi' = -/+ D q x */
-        mpfr_set_ui(o->a, 1, MPFR_RNDN);
-        if (is_far) {
-            mpfr_mul_d(o->a, o->q[i], -d, MPFR_RNDN);
-            mpfr_exp(o->a, o->a, MPFR_RNDN);
-        }
-        mpfr_mul(o->b, o->diffusion[i], o->q[i], MPFR_RNDN);
-        mpfr_mul_d(o->b, o->b, way == 0 ? -coefficient_flux : coefficient_flux, MPFR_RNDN);
-        mpfr_add_d(o->b, o->b, coefficient_phi, MPFR_RNDN);
-        mpfr_mul(o->a, o->a, o->b, MPFR_RNDN);
-        mpfr_add(o->rows[row][2 * i + (size_t)way], o->rows[row][2 * i + (size_t)way], o->a, MPFR_RNDN);
-        /* particular: phi = sigma_s' beam/(D (q^2 - sigma_t^2)) e^(-sigma_t ...) */
-        mpfr_sqr(o->a, o->q[i], MPFR_RNDN);
-        mpfr_sqr(o->b, o->sigma_t[i], MPFR_RNDN);
-        mpfr_sub(o->a, o->a, o->b, MPFR_RNDN);
-        mpfr_mul(o->a, o->a, o->diffusion[i], MPFR_RNDN);
-        mpfr_div(o->a, way == 0 ? o->down[i] : o->up[i], o->a, MPFR_RNDN);
-        mpfr_mul_d(o->a, o->a, o->layers[i].medium.sigma_s_prime_per_mm, MPFR_RNDN);
-        if (is_far) {
-            oracle_through(o, i, o->b);
-            mpfr_mul(o->a, o->a, o->b, MPFR_RNDN);
-        }
-        mpfr_mul(o->b, o->diffusion[i], o->sigma_t[i], MPFR_RNDN);
-        mpfr_mul_d(o->b, o->b, way == 0 ? -coefficient_flux : coefficient_flux, MPFR_RNDN);
-        mpfr_add_d(o->b, o->b, coefficient_phi, MPFR_RNDN);
-        mpfr_mul(o->a, o->a, o->b, MPFR_RNDN);
+    const size_t way_count = isinf(o->layers[i].thickness_mm) ? 1 : 2;
+    for (size_t way = 0; way < way_count; way++) {
+        const bool is_far = is_bottom == (way == 0); /* from where the exponential is 1 */
+        const double flux = way == 0 ? -coefficient_flux : coefficient_flux;
+        mpfr_mul_d(o->a, o->layer[i][ORACLE_DQ], flux, MPFR_RNDN);
+        mpfr_add_d(o->a, o->a, coefficient_phi, MPFR_RNDN);
+        if (is_far)
+            mpfr_mul(o->a, o->a, o->layer[i][ORACLE_FADE_Q], MPFR_RNDN);
+        mpfr_add(o->rows[row][2 * i + way], o->rows[row][2 * i + way], o->a, MPFR_RNDN);
+        mpfr_mul_d(o->a, o->layer[i][ORACLE_D_SIGMA_T], flux, MPFR_RNDN);
+        mpfr_add_d(o->a, o->a, coefficient_phi, MPFR_RNDN);
+        mpfr_mul(o->a, o->a, o->layer[i][way == 0 ? ORACLE_DOWN : ORACLE_UP], MPFR_RNDN);
+        if (is_far)
+            mpfr_mul(o->a, o->a, o->layer[i][ORACLE_FADE_T], MPFR_RNDN);
         mpfr_sub(o->rows[row][n], o->rows[row][n], o->a, MPFR_RNDN);
     }
 }
@@ -249,32 +254,50 @@ static inline void oracle_condition(struct layers_oracle *o, size_t row, size_t 
 /* phi at the top or bottom over 2A: what leaves there. o->rows must be solved. */
 static inline double oracle_leaving(struct layers_oracle *o, size_t i, bool is_bottom, double a)
 {
-    const size_t n = o->unknowns;
-    const bool is_infinite = isinf(o->layers[i].thickness_mm);
+    const size_t way_count = isinf(o->layers[i].thickness_mm) ? 1 : 2;
     mpfr_set_zero(o->c, 1);
-    for (int way = 0; way < 2 && !(is_infinite && way == 1); way++) {
+    for (size_t way = 0; way < way_count; way++) {
         const bool is_far = is_bottom == (way == 0);
-        mpfr_set(o->a, o->rows[2 * i + (size_t)way][n], MPFR_RNDN);
+        mpfr_set(o->a, o->rows[2 * i + way][o->unknowns], MPFR_RNDN);
+        mpfr_set(o->b, o->layer[i][way == 0 ? ORACLE_DOWN : ORACLE_UP], MPFR_RNDN);
         if (is_far) {
-            mpfr_mul_d(o->b, o->q[i], -o->layers[i].thickness_mm, MPFR_RNDN);
-            mpfr_exp(o->b, o->b, MPFR_RNDN);
-            mpfr_mul(o->a, o->a, o->b, MPFR_RNDN);
+            mpfr_mul(o->a, o->a, o->layer[i][ORACLE_FADE_Q], MPFR_RNDN);
+            mpfr_mul(o->b, o->b, o->layer[i][ORACLE_FADE_T], MPFR_RNDN);
         }
         mpfr_add(o->c, o->c, o->a, MPFR_RNDN);
-        mpfr_sqr(o->a, o->q[i], MPFR_RNDN);
-        mpfr_sqr(o->b, o->sigma_t[i], MPFR_RNDN);
-        mpfr_sub(o->a, o->a, o->b, MPFR_RNDN);
-        mpfr_mul(o->a, o->a, o->diffusion[i], MPFR_RNDN);
-        mpfr_div(o->a, way == 0 ? o->down[i] : o->up[i], o->a, MPFR_RNDN);
-        mpfr_mul_d(o->a, o->a, o->layers[i].medium.sigma_s_prime_per_mm, MPFR_RNDN);
-        if (is_far) {
-            oracle_through(o, i, o->b);
-            mpfr_mul(o->a, o->a, o->b, MPFR_RNDN);
-        }
-        mpfr_add(o->c, o->c, o->a, MPFR_RNDN);
+        mpfr_add(o->c, o->c, o->b, MPFR_RNDN);
     }
     mpfr_div_d(o->c, o->c, 2.0 * a, MPFR_RNDN);
     return mpfr_get_d(o->c, MPFR_RNDN);
+}
+
+/* The numbers of a layer at k. A beam causes sigma_s' beam/(D (q^2 - sigma_t'^2)) e^(-sigma_t' ...). */
+static inline void oracle_layer_fill(struct layers_oracle *o, size_t i, double k)
+{
+    const dipole_medium *const m = &o->layers[i].medium;
+    mpfr_t *const x = o->layer[i];
+    mpfr_set_d(x[ORACLE_SIGMA_T], m->sigma_a_per_mm, MPFR_RNDN);
+    mpfr_add_d(x[ORACLE_SIGMA_T], x[ORACLE_SIGMA_T], m->sigma_s_prime_per_mm, MPFR_RNDN);
+    mpfr_mul_ui(o->a, x[ORACLE_SIGMA_T], 3, MPFR_RNDN);
+    mpfr_ui_div(o->b, 1, o->a, MPFR_RNDN); /* D */
+    mpfr_mul_d(o->a, o->a, m->sigma_a_per_mm, MPFR_RNDN);
+    mpfr_set_d(o->c, k, MPFR_RNDN);
+    mpfr_sqr(o->c, o->c, MPFR_RNDN);
+    mpfr_add(o->c, o->c, o->a, MPFR_RNDN); /* q^2 */
+    mpfr_sqrt(x[ORACLE_Q], o->c, MPFR_RNDN);
+    mpfr_mul(x[ORACLE_DQ], o->b, x[ORACLE_Q], MPFR_RNDN);
+    mpfr_mul(x[ORACLE_D_SIGMA_T], o->b, x[ORACLE_SIGMA_T], MPFR_RNDN);
+    mpfr_sqr(o->a, x[ORACLE_SIGMA_T], MPFR_RNDN);
+    mpfr_sub(o->c, o->c, o->a, MPFR_RNDN);
+    mpfr_mul(o->c, o->c, o->b, MPFR_RNDN);
+    mpfr_d_div(o->c, m->sigma_s_prime_per_mm, o->c, MPFR_RNDN);
+    mpfr_mul(x[ORACLE_DOWN], o->c, o->down[i], MPFR_RNDN);
+    mpfr_mul(x[ORACLE_UP], o->c, o->up[i], MPFR_RNDN);
+    if (isinf(o->layers[i].thickness_mm))
+        return;
+    oracle_through(o, i, x[ORACLE_FADE_T]);
+    mpfr_mul_d(x[ORACLE_FADE_Q], x[ORACLE_Q], -o->layers[i].thickness_mm, MPFR_RNDN);
+    mpfr_exp(x[ORACLE_FADE_Q], x[ORACLE_FADE_Q], MPFR_RNDN);
 }
 
 /* R^(k), T^(k), k > 0; as k goes to 0 the totals. */
@@ -282,18 +305,8 @@ static inline void layers_oracle_response(struct layers_oracle *o, double k, dou
 {
     const size_t n = 2 * o->count - (o->is_half_space ? 1 : 0);
     oracle_precision_set(o, n, oracle_bits(o, k));
-    for (size_t i = 0; i < o->count; i++) {
-        const dipole_medium *const m = &o->layers[i].medium;
-        mpfr_set_d(o->sigma_t[i], m->sigma_a_per_mm, MPFR_RNDN);
-        mpfr_add_d(o->sigma_t[i], o->sigma_t[i], m->sigma_s_prime_per_mm, MPFR_RNDN);
-        mpfr_mul_ui(o->a, o->sigma_t[i], 3, MPFR_RNDN);
-        mpfr_ui_div(o->diffusion[i], 1, o->a, MPFR_RNDN);
-        mpfr_mul_d(o->a, o->a, m->sigma_a_per_mm, MPFR_RNDN);
-        mpfr_set_d(o->b, k, MPFR_RNDN);
-        mpfr_sqr(o->b, o->b, MPFR_RNDN);
-        mpfr_add(o->a, o->a, o->b, MPFR_RNDN);
-        mpfr_sqrt(o->q[i], o->a, MPFR_RNDN);
-    }
+    for (size_t i = 0; i < o->count; i++)
+        oracle_layer_fill(o, i, k);
     oracle_condition(o, 0, 0, false, 1.0, -2.0 * o->boundary_a[0]); /* phi = 2A D phi' */
     for (size_t i = 0; i + 1 < o->count; i++) {
         const double n_above = o->layers[i].medium.eta, n_below = o->layers[i + 1].medium.eta;
@@ -307,6 +320,133 @@ static inline void layers_oracle_response(struct layers_oracle *o, double k, dou
     oracle_solve(o);
     out[0] = oracle_leaving(o, 0, false, o->boundary_a[0]);
     out[1] = o->is_half_space ? 0.0 : oracle_leaving(o, o->count - 1, true, o->boundary_a[1]);
+}
+
+/* ---- profiles ------------------------------------------------------------------------------------- */
+
+enum { ORACLE_POINTS = 16, ORACLE_OCTAVES = 80 };
+
+/* R^ and T^ from k_lo on, each octave at Chebyshev's points. Below k_lo they are constant. */
+struct layers_spectrum {
+    struct layers_oracle *oracle;
+    double k_lo;
+    int octave_count;
+    double values[2][ORACLE_OCTAVES][ORACLE_POINTS];
+};
+
+static inline double oracle_chebyshev(int i)
+{
+    return cos(3.14159265358979323846 * (i + 0.5) / ORACLE_POINTS);
+}
+
+/* The octaves are solved as they are asked for. */
+static inline void layers_spectrum_init(struct layers_spectrum *s, struct layers_oracle *oracle,
+                                        double k_lo)
+{
+    s->oracle = oracle;
+    s->k_lo = k_lo;
+    s->octave_count = 0;
+}
+
+static inline double layers_spectrum_at(struct layers_spectrum *s, int face, double k)
+{
+    if (k < s->k_lo)
+        k = s->k_lo;
+    const int octave = (int)floor(log2(k / s->k_lo));
+    while (s->octave_count <= octave) {
+        for (int i = 0; i < ORACLE_POINTS; i++) {
+            double f[2];
+            layers_oracle_response(s->oracle,
+                                   ldexp(s->k_lo, s->octave_count) * (1.5 + 0.5 * oracle_chebyshev(i)), f);
+            s->values[0][s->octave_count][i] = f[0];
+            s->values[1][s->octave_count][i] = f[1];
+        }
+        s->octave_count++;
+    }
+    /* barycentric */
+    const double x = 2.0 * (k / ldexp(s->k_lo, octave)) - 3.0;
+    double above = 0.0, below = 0.0;
+    for (int i = 0; i < ORACLE_POINTS; i++) {
+        const double gap = x - oracle_chebyshev(i);
+        if (gap == 0.0)
+            return s->values[face][octave][i];
+        const double weight =
+            (i % 2 ? -1.0 : 1.0) * sin(3.14159265358979323846 * (i + 0.5) / ORACLE_POINTS) / gap;
+        above += weight * s->values[face][octave][i];
+        below += weight;
+    }
+    return above / below;
+}
+
+/* int F J_0(kr) k dk over an interval, within one octave of k and 4 of kr, by Gauss's rule. */
+static inline double oracle_piece(struct layers_spectrum *s, int face, double r_mm, double lo, double hi)
+{
+    static const double gauss[8][2] = {
+        { 0.095012509837637440185, 0.189450610455068496285 },
+        { 0.281603550779258913230, 0.182603415044923588867 },
+        { 0.458016777657227386342, 0.169156519395002538189 },
+        { 0.617876244402643748447, 0.149595988816576732081 },
+        { 0.755404408355003033895, 0.124628971255533872052 },
+        { 0.865631202387831743880, 0.095158511682492784810 },
+        { 0.944575023073232576078, 0.062253523938647892863 },
+        { 0.989400934991649932596, 0.027152459411754094852 },
+    };
+    double sum = 0.0;
+    for (int i = 0; i < 16; i++) {
+        const double k = 0.5 * (lo + hi) + (i % 2 ? -0.5 : 0.5) * (hi - lo) * gauss[i / 2][0];
+        sum += gauss[i / 2][1] * layers_spectrum_at(s, face, k) * j0(k * r_mm) * k;
+    }
+    return 0.5 * (hi - lo) * sum;
+}
+
+/* The same over any interval. */
+static inline double oracle_integral(struct layers_spectrum *s, int face, double r_mm, double lo, double hi)
+{
+    double sum = 0.0;
+    if (lo < s->k_lo) {
+        const double end = fmin(hi, s->k_lo);
+        sum = 0.5 * (end - lo) * (end + lo) * layers_spectrum_at(s, face, s->k_lo); /* k_lo r is small */
+        lo = end;
+    }
+    while (lo < hi) {
+        const int octave = (int)floor(log2(lo / s->k_lo * (1.0 + 1e-12)));
+        const double end = fmin(fmin(hi, ldexp(s->k_lo, octave + 1)), lo + 4.0 / r_mm);
+        sum += oracle_piece(s, face, r_mm, lo, end * (1.0 - 1e-15));
+        lo = end;
+    }
+    return sum;
+}
+
+/* The profile: integrals between zeros of J_0, near (n - 1/4) pi, until F is nothing; else what 40 of them
+ * say of the limit, by the epsilon algorithm. */
+static inline double layers_oracle_profile(struct layers_spectrum *s, int face, double r_mm)
+{
+    enum { STEPS = 40 };
+    const double pi = 3.14159265358979323846;
+    double table[STEPS + 1][STEPS + 1], sum = 0.0, lo = 0.0, largest = 0.0;
+    for (int n = 0; n <= STEPS; n++) {
+        const double hi = (n + 0.75) * pi / r_mm, piece = oracle_integral(s, face, r_mm, lo, hi);
+        sum += piece;
+        largest = fmax(largest, fabs(sum));
+        lo = hi;
+        if (fabs(piece) < 1e-16 * largest && n > 1)
+            return sum / (2.0 * pi);
+        table[n][0] = sum;
+    }
+    /* epsilon_(k+1)^(n) = epsilon_(k-1)^(n+1) + 1/(epsilon_k^(n+1) - epsilon_k^(n)) */
+    double best = sum, smallest = INFINITY;
+    for (int k = 1; k <= STEPS; k++) {
+        for (int n = 0; n + k <= STEPS; n++) {
+            const double gap = table[n + 1][k - 1] - table[n][k - 1];
+            table[n][k] = (k > 1 ? table[n + 1][k - 2] : 0.0) + 1.0 / gap;
+        }
+        const double change = k % 2 ? INFINITY : fabs(table[STEPS - k][k] - best);
+        if (k % 2 == 0 && change < smallest) {
+            smallest = change;
+            best = table[STEPS - k][k];
+        }
+    }
+    return best / (2.0 * pi);
 }
 
 #endif
