@@ -92,6 +92,7 @@ double dipole_system_first_singularity_per_mm(const struct system *system);
 void dipole_better_dipole_solve(const struct system *system, double complex k2, struct dual out[2]);
 /* Donner and Jensen's multipole and their combination of layers. T25 */
 void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2]);
+double dipole_multipole_first_singularity_per_mm(const struct system *system);
 
 /* ---- inverse Hankel transforms (hankel.c) --------------------------------------------------------- */
 

@@ -144,30 +144,23 @@ static bool coefficients_fill(dipole_stack *stack, dipole_status *status)
     return true;
 }
 
-/* sigma_tr of a layer as the model has it. */
-static double layer_sigma_tr_per_mm(const dipole_stack *stack, size_t i, dipole_model model)
+/* sigma_tr of the last layer as the model has it. */
+static double base_sigma_tr_per_mm(const dipole_stack *stack, dipole_model model)
 {
-    const dipole_coefficients *const c = &stack->coefficients[i];
+    const dipole_coefficients *const c = &stack->coefficients[stack->count - 1];
     const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
     return model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
                                                : c->sigma_tr_per_mm;
 }
 
-static double base_sigma_tr_per_mm(const dipole_stack *stack, dipole_model model)
-{
-    return layer_sigma_tr_per_mm(stack, stack->count - 1, model);
-}
-
-/* Where R^ and T^ begin to be singular. Of the papers' models only a lower bound is known: the smallest
- * sigma_tr of a layer. */
+/* Where R^ and T^ begin to be singular. */
 static double singularity_per_mm(const dipole_stack *stack, dipole_model model)
 {
     if (model == DIPOLE_MODEL_BEAM)
         return dipole_system_first_singularity_per_mm(&stack->system);
-    double smallest = INFINITY;
-    for (size_t i = 0; i < stack->count; i++)
-        smallest = fmin(smallest, layer_sigma_tr_per_mm(stack, i, model));
-    return smallest;
+    if (model == DIPOLE_MODEL_MULTIPOLE)
+        return dipole_multipole_first_singularity_per_mm(&stack->system);
+    return base_sigma_tr_per_mm(stack, model);
 }
 
 static double shortest_length_mm(const dipole_stack *stack)
@@ -414,57 +407,91 @@ double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face fac
     return sum;
 }
 
+/* ---- radii and spacings ----------------------------------------------------------------------------- */
+
+struct question {
+    const dipole_stack *stack;
+    dipole_face face;
+    double target;
+    bool is_within;
+};
+
+/* log of a falling function of e^log_x over its target. What has underflown is as good as 1e-308. */
+typedef double falling_log(const struct question *question, double log_x);
+
+/*
+ * The root, to rounding, by Chandrupatla's method: inverse quadratic interpolation where it is safe, else
+ * bisection. The root is sought around log_start with ever longer strides.
+ */
+static double root_find(falling_log *f, const struct question *question, double log_start)
+{
+    double b = log_start, f_b = f(question, b), stride = f_b > 0.0 ? 0.7 : -0.7;
+    double a = b + stride, f_a = f(question, a);
+    while ((f_a > 0.0) == (f_b > 0.0)) {
+        b = a, f_b = f_a;
+        stride *= 2.0;
+        a += stride, f_a = f(question, a);
+    }
+    double c = a, f_c = f_a, share = 0.5;
+    for (;;) {
+        const double x = a + share * (b - a), f_x = f(question, x);
+        if ((f_x > 0.0) == (f_a > 0.0)) {
+            c = a, f_c = f_a;
+        } else {
+            c = b, f_c = f_b;
+            b = a, f_b = f_a;
+        }
+        a = x, f_a = f_x;
+        const double best = fabs(f_a) < fabs(f_b) ? a : b;
+        const double smallest = 2e-16 * fmax(1.0, fabs(best)) / fabs(b - a);
+        if (f_a == 0.0 || !(smallest < 0.5))
+            return best;
+        const double xi = (a - b) / (c - b), phi = (f_a - f_b) / (f_c - f_b);
+        share = phi * phi < xi && square(1.0 - phi) < 1.0 - xi
+                    ? f_a / (f_b - f_a) * f_c / (f_b - f_c) +
+                          (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+                    : 0.5;
+        share = fmax(smallest, fmin(1.0 - smallest, share));
+    }
+}
+
+static double reach_log(const struct question *question, double log_r)
+{
+    const double r_mm = exp(log_r);
+    if (question->is_within)
+        return -log(fmax(1e-308, dipole_stack_within(question->stack, question->face, r_mm)) /
+                    question->target);
+    return log(fmax(1e-308, dipole_stack_beyond(question->stack, question->face, r_mm)) / question->target);
+}
+
+static double spectrum_log(const struct question *question, double log_k)
+{
+    const double f = dipole_stack_spectrum(question->stack, question->face, exp(log_k));
+    return log(fmax(1e-308, f) / question->target);
+}
+
 double dipole_stack_r_max_mm(const dipole_stack *stack, dipole_face face, double epsilon)
 {
     if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 1.0))
         return NAN;
-    const double target = epsilon * stack->total[face];
-    if (!(target > 0.0))
+    const bool is_within = epsilon > 0.5;
+    const double target = (is_within ? 1.0 - epsilon : epsilon) * stack->total[face];
+    if (!(target > 1e-307))
         return 0.0;
-    /* the power beyond falls from the total at 0: double, then halve, in log r */
-    double lo = stack->r_floor_mm, hi = stack->coefficients[0].mean_free_path_mm;
-    while (dipole_stack_beyond(stack, face, hi) > target) {
-        lo = hi;
-        hi *= 2.0;
-    }
-    while (hi > lo * (1.0 + 4e-16)) {
-        const double middle = hi > 1.1 * lo ? sqrt(lo) * sqrt(hi) : lo + 0.5 * (hi - lo);
-        if (middle <= lo || middle >= hi)
-            break;
-        if (dipole_stack_beyond(stack, face, middle) > target)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    return hi;
+    const struct question question = { stack, face, target, is_within };
+    return exp(root_find(reach_log, &question, log(stack->coefficients[0].mean_free_path_mm)));
 }
 
-/* log of spectrum(k)/spectrum(0) over epsilon/4, which falls with k; bisected in log k. */
 double dipole_stack_splat_spacing_mm(const dipole_stack *stack, dipole_face face, double epsilon)
 {
     if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 4.0))
         return NAN;
     const double target = 0.25 * epsilon * stack->total[face];
-    if (!(target > 0.0))
+    if (!(target > 1e-307))
         return INFINITY;
-    double lo = 0.0, hi = stack->coefficients[0].sigma_t_prime_per_mm;
-    while (dipole_stack_spectrum(stack, face, hi) > target) {
-        lo = hi;
-        hi *= 2.0;
-    }
-    while (lo == 0.0) {
-        if (dipole_stack_spectrum(stack, face, 0.5 * hi) > target)
-            lo = 0.5 * hi;
-        else
-            hi *= 0.5;
-    }
-    for (double middle; middle = 0.5 * (lo + hi), middle > lo && middle < hi;) {
-        if (dipole_stack_spectrum(stack, face, middle) > target)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    return 2.0 * PI / hi;
+    const struct question question = { stack, face, target, false };
+    return 2.0 * PI /
+           exp(root_find(spectrum_log, &question, log(stack->coefficients[0].sigma_t_prime_per_mm)));
 }
 
 /* ---- derivatives ---------------------------------------------------------------------------------- */
