@@ -29,9 +29,27 @@ static inline struct dual multiply(struct dual a, struct dual b)
     return (struct dual){ a.v * b.v, a.d * b.v + a.v * b.d };
 }
 
+/* |re| + |im|, within sqrt(2) of the modulus */
+static inline double size(double complex x)
+{
+    return fabs(creal(x)) + fabs(cimag(x));
+}
+
+/* 1/x by Smith's method: no part is squared, so nothing overflows on the way. */
+static inline double complex inverse_of(double complex x)
+{
+    const double a = creal(x), b = cimag(x);
+    if (fabs(a) >= fabs(b)) {
+        const double r = b / a, d = 1.0 / (a + b * r);
+        return CMPLX(d, -r * d);
+    }
+    const double r = a / b, d = 1.0 / (b + a * r);
+    return CMPLX(r * d, -d);
+}
+
 static inline struct dual divide(struct dual a, struct dual b)
 {
-    const double complex inverse = 1.0 / b.v, v = a.v * inverse;
+    const double complex inverse = inverse_of(b.v), v = a.v * inverse;
     return (struct dual){ v, (a.d - v * b.d) * inverse };
 }
 
@@ -87,7 +105,7 @@ static inline struct dual fade_mean(struct dual x)
             -0.5 + y / 3.0 - y * y / 8.0 + y * y * y / 30.0 - y * y * y * y / 144.0;
         return (struct dual){ v, slope * x.d };
     }
-    const double complex e = decay_value(y), inverse = 1.0 / y, v = fade_value(y, e) * inverse;
+    const double complex e = decay_value(y), inverse = inverse_of(y), v = fade_value(y, e) * inverse;
     return (struct dual){ v, (e - v) * inverse * x.d };
 }
 

@@ -170,17 +170,18 @@ static bool contour_fill(struct hankel *hankel, const struct hankel_input *input
         node.term = node.weight * input->response(input->context, -kappa * kappa);
         if (is_cut)
             node.term = I * cimag(node.term);
-        const double size = cabs(node.term) * exp(-(creal(kappa) - contour->vertex) * contour->r_from_mm);
-        largest = fmax(largest, size);
-        largest_term = fmax(largest_term, cabs(node.term));
-        if (!(size >= 1e-20 * largest) || (is_first && cabs(kappa) * input->r_min_mm > 1e7))
+        const double reached =
+            size(node.term) * exp(-(creal(kappa) - contour->vertex) * contour->r_from_mm);
+        largest = fmax(largest, reached);
+        largest_term = fmax(largest_term, size(node.term));
+        if (!(reached >= 1e-20 * largest) || (is_first && size(kappa) * input->r_min_mm > 1e7))
             break;
         if (!node_append(hankel, &node))
             return false;
     }
     contour->count = hankel->node_count - contour->first;
     for (size_t j = hankel->node_count; j-- > contour->first;)
-        if (cabs(hankel->nodes[j].term) > 1e-22 * largest_term)
+        if (size(hankel->nodes[j].term) > 1e-22 * largest_term)
             contour->kappa_low = creal(hankel->nodes[j].kappa);
     return true;
 }

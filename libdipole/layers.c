@@ -121,8 +121,8 @@ struct crossing {
 /* sum_n x^n series[stride n + first], for |x| < 1/4 to rounding if the terms fall as 1/(2n)!. */
 static struct dual power_series(const struct dual *series, int first, struct dual x)
 {
-    struct dual sum = constant(0.0);
-    for (int n = SLAB_MOMENTS / 2 - 1; n >= 0; n--)
+    struct dual sum = series[SLAB_MOMENTS - 2 + first];
+    for (int n = SLAB_MOMENTS / 2 - 2; n >= 0; n--)
         sum = add(multiply(sum, x), series[2 * n + first]);
     return sum;
 }
@@ -182,7 +182,7 @@ static struct crossing cross_thick(const struct slab *slab, struct dual q2)
         .far_sinh = scale(0.5, divide(subtract(mean, multiply(e, sum)), q)),
         .q2 = q2,
     };
-    if (creal(sigma_t.v) > 2.0 * cabs(q.v)) /* where the two nearly cancel */
+    if (creal(sigma_t.v) > 2.0 * size(q.v)) /* where the two nearly cancel */
         out.far_sinh =
             divide(subtract(e, multiply(slab->through, add(out.cosh, multiply(sigma_t, out.sinh)))),
                    subtract(multiply(sigma_t, sigma_t), q2));
@@ -192,7 +192,7 @@ static struct crossing cross_thick(const struct slab *slab, struct dual q2)
 static struct crossing cross(const struct slab *slab, double complex k2)
 {
     const struct dual q2 = { slab->sigma_tr2.v + k2, slab->sigma_tr2.d };
-    return cabs(q2.v) * square(creal(slab->thickness.v)) < 0.25 ? cross_thin(slab, q2)
+    return size(q2.v) * square(creal(slab->thickness.v)) < 0.25 ? cross_thin(slab, q2)
                                                                 : cross_thick(slab, q2);
 }
 

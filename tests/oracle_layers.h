@@ -6,7 +6,7 @@
  * oracle).
  *
  * Profiles from it: R^ and T^ along the real k axis, interpolated by polynomials on each octave, are
- * integrated against J_0(kr) k between the zeros of J_0, and the sums accelerated by Wynn's algorithm.
+ * integrated against J_0(kr) k between the zeros of J_0, and the alternating sums averaged (Euler).
  */
 #ifndef ORACLE_LAYERS_H
 #define ORACLE_LAYERS_H
@@ -417,36 +417,26 @@ static inline double oracle_integral(struct layers_spectrum *s, int face, double
     return sum;
 }
 
-/* The profile: integrals between zeros of J_0, near (n - 1/4) pi, until F is nothing; else what 40 of them
- * say of the limit, by the epsilon algorithm. */
+/* The profile: integrals between zeros of J_0, near (n - 1/4) pi, until F is nothing; else the limit of their
+ * alternating sum by averaging neighbouring partial sums again and again, which is kind to rounding. */
 static inline double layers_oracle_profile(struct layers_spectrum *s, int face, double r_mm)
 {
-    enum { STEPS = 40 };
+    enum { STEPS = 72, PLAIN = 24 };
     const double pi = 3.14159265358979323846;
-    double table[STEPS + 1][STEPS + 1], sum = 0.0, lo = 0.0, largest = 0.0;
-    for (int n = 0; n <= STEPS; n++) {
+    double sums[STEPS], sum = 0.0, lo = 0.0, largest = 0.0;
+    for (int n = 0; n < STEPS; n++) {
         const double hi = (n + 0.75) * pi / r_mm, piece = oracle_integral(s, face, r_mm, lo, hi);
         sum += piece;
         largest = fmax(largest, fabs(sum));
         lo = hi;
-        if (fabs(piece) < 1e-16 * largest && n > 1)
+        if (fabs(piece) < 1e-17 * largest && n > 1)
             return sum / (2.0 * pi);
-        table[n][0] = sum;
+        sums[n] = sum;
     }
-    /* epsilon_(k+1)^(n) = epsilon_(k-1)^(n+1) + 1/(epsilon_k^(n+1) - epsilon_k^(n)) */
-    double best = sum, smallest = INFINITY;
-    for (int k = 1; k <= STEPS; k++) {
-        for (int n = 0; n + k <= STEPS; n++) {
-            const double gap = table[n + 1][k - 1] - table[n][k - 1];
-            table[n][k] = (k > 1 ? table[n + 1][k - 2] : 0.0) + 1.0 / gap;
-        }
-        const double change = k % 2 ? INFINITY : fabs(table[STEPS - k][k] - best);
-        if (k % 2 == 0 && change < smallest) {
-            smallest = change;
-            best = table[STEPS - k][k];
-        }
-    }
-    return best / (2.0 * pi);
+    for (int end = STEPS - 1; end > PLAIN; end--)
+        for (int n = PLAIN; n < end; n++)
+            sums[n] = 0.5 * (sums[n] + sums[n + 1]);
+    return sums[PLAIN] / (2.0 * pi);
 }
 
 #endif
