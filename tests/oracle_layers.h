@@ -176,14 +176,14 @@ static inline void oracle_beams(struct layers_oracle *o)
 /* ---- one stack ------------------------------------------------------------------------------------ */
 
 /* layers must stay; light from above. */
-static inline void layers_oracle_init(struct layers_oracle *o, const dipole_layer *layers, size_t count,
-                                      const dipole_stack *stack)
+static inline void layers_oracle_init(struct layers_oracle *o, const dipole_layer *layers,
+                                      const dipole_coefficients *coefficients, size_t count)
 {
     o->count = count;
     o->layers = layers;
     o->is_half_space = isinf(layers[count - 1].thickness_mm);
-    o->boundary_a[0] = dipole_stack_coefficients(stack, 0)->boundary_a;
-    o->boundary_a[1] = dipole_stack_coefficients(stack, count - 1)->boundary_a;
+    o->boundary_a[0] = coefficients[0].boundary_a;
+    o->boundary_a[1] = coefficients[count - 1].boundary_a;
     for (size_t i = 0; i < ORACLE_UNKNOWNS; i++)
         for (size_t j = 0; j <= ORACLE_UNKNOWNS; j++)
             mpfr_init2(o->rows[i][j], 64);
@@ -417,8 +417,9 @@ static inline double oracle_integral(struct layers_spectrum *s, int face, double
     return sum;
 }
 
-/* The profile: integrals between zeros of J_0, near (n - 1/4) pi, until F is nothing; else the limit of their
- * alternating sum by averaging neighbouring partial sums again and again, which is kind to rounding. */
+/* The profile: integrals between zeros of J_0, near (n - 1/4) pi, until F is nothing; else the limit of
+ * their alternating sum by averaging neighbouring partial sums again and again, which is kind to rounding.
+ */
 static inline double layers_oracle_profile(struct layers_spectrum *s, int face, double r_mm)
 {
     enum { STEPS = 72, PLAIN = 24 };
