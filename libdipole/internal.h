@@ -43,10 +43,13 @@ double dipole_fresnel_second_moment_inside(double eta);
 
 /* ---- one spatial frequency of a stack (layers.c) -------------------------------------------------- */
 
+enum { SLAB_MOMENTS = 16 };
+
 struct slab {
     struct dual sigma_s_prime, sigma_t_prime, diffusion, sigma_tr2, thickness;
     struct dual down, up; /* beams entering from above and from below, per unit that entered the stack */
     struct dual through;  /* e^(-sigma_t' thickness)                                                  */
+    struct dual near_moments[SLAB_MOMENTS], far_moments[SLAB_MOMENTS]; /* of the fading beam            */
 };
 
 struct system {
@@ -72,56 +75,67 @@ double dipole_system_first_singularity_per_mm(const struct system *system);
 void dipole_better_dipole_solve(const struct system *system, double complex k2, struct dual out[2]);
 /* Donner and Jensen's multipole and their combination of layers. T25 */
 void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2]);
+double dipole_multipole_first_singularity_per_mm(const struct system *system);
 
 /* ---- inverse Hankel transforms (hankel.c) --------------------------------------------------------- */
 
-/* A contour for ever larger singularity x r: the farther out, the closer it must pass. */
+/* One face of a model: F at k^2, and what is known of it. */
+typedef double complex hankel_function(const void *context, double complex k2);
+
+struct hankel_input {
+    hankel_function *response;
+    const void *context;
+    double singularity_per_mm; /* the smallest kappa where F is singular at k^2 = -kappa^2             */
+    bool is_cut;               /* it is the beginning of a cut, F being analytic in q of the base      */
+    double r_min_mm;           /* smallest radius                                                      */
+    double extent_mm;          /* of all that is not the base, and its mean free path                  */
+};
+
+/* kappa = scale cosh(t + i angle), for radii from r_from_mm on. */
 struct hankel_contour {
-    double kappa_r_min; /* smallest singularity x r it serves */
-    double angle, step;
+    double scale, angle, step;
+    double vertex, log_response; /* where it leaves the real axis, and F there */
+    double kappa_low;            /* below it the terms are nothing             */
+    double r_from_mm;
     size_t first, count; /* its nodes */
 };
 
-/* (1/2 pi) int F(k) J_0(kr) k dk = sum_j Im [weight_j F(-kappa_j^2) kernel(kappa_j, r)] over a range of
- * nodes. */
+/* (1/2 pi) int F(k) J_0(kr) k dk = sum_j Im [term_j K_0(kappa_j r)], term = weight F(-kappa^2). */
 struct hankel_node {
-    double complex kappa, weight;
+    double complex kappa, log_kappa, weight, term;
 };
 
-struct hankel_range {
-    size_t first, count;
-};
-
-enum { HANKEL_CONTOURS = 5 };
+enum { HANKEL_CONTOURS = 40 };
 
 struct hankel {
-    double singularity_per_mm, log_start;
     struct hankel_contour contours[HANKEL_CONTOURS];
-    size_t node_count;
+    size_t contour_count; /* 0 if nothing leaves by this face */
+    double r_far_mm;      /* from here on the profile falls as r^-3 */
     struct hankel_node *nodes;
+    size_t node_count, node_limit;
 };
 
-/* Lay out contours for radii from r_min_mm, for F singular from singularity_per_mm on; returns how many
- * nodes dipole_hankel_fill() needs. longest_mm: longest length in F. */
-size_t dipole_hankel_plan(struct hankel *hankel, double singularity_per_mm, double r_min_mm,
-                          double longest_mm);
-void dipole_hankel_fill(struct hankel *hankel, struct hankel_node *nodes);
-/* The nodes that matter for the profile at a radius and the power beyond it; those for the power within. */
-struct hankel_range dipole_hankel_range_for(const struct hankel *hankel, double r_mm);
-struct hankel_range dipole_hankel_range_all(const struct hankel *hankel);
-/* Part of the total that the beyond kernel misses at the start of the ray. */
-double dipole_hankel_start_share(const struct hankel *hankel);
-/* Kernels: of the profile, and of its integrals over the plane beyond r and within r. */
-double complex dipole_hankel_profile_kernel(double complex kappa, double r_mm);
-double complex dipole_hankel_beyond_kernel(double complex kappa, double r_mm);
-double complex dipole_hankel_within_kernel(double complex kappa, double r_mm);
+/* False without memory. dipole_hankel_clear() ends it. */
+bool dipole_hankel_init(struct hankel *hankel, const struct hankel_input *input);
+void dipole_hankel_clear(struct hankel *hankel);
+/* The profile at a radius and the power beyond and within it; r_min_mm <= r_mm < infinity. */
+double dipole_hankel_profile(const struct hankel *hankel, double r_mm);
+double dipole_hankel_beyond(const struct hankel *hankel, double r_mm);
+double dipole_hankel_within(const struct hankel *hankel, double r_mm);
+/* What the sums run over, for others to do it: the contour for a radius, NULL where all has underflown; k^2
+ * at a node; whether the node matters for a radius; and by how much the profile falls from r_far_mm to
+ * r_mm. */
+const struct hankel_contour *dipole_hankel_contour_for(const struct hankel *hankel, double r_mm);
+bool dipole_hankel_is_needed(const struct hankel_contour *contour, const struct hankel_node *node,
+                             double r_mm);
+double dipole_hankel_far_factor(const struct hankel *hankel, double r_mm);
 
 /* ---- Bessel functions (bessel.c) ------------------------------------------------------------------ */
 
-/* e^z K_0(z) and e^z K_1(z) for |arg z| <= pi/2, z not 0; relative error below 2e-14 to pi/4. */
-struct bessel_k {
-    double complex k0, k1;
-};
-struct bessel_k dipole_bessel_k_scaled(double complex z);
+/* K_0(z), z K_1(z) and 1 - z K_1(z) for |arg z| <= pi/4, z not 0, given log z; relative error below 1e-14,
+ * for large z times |z|/16. */
+double complex dipole_bessel_k0(double complex z, double complex log_z);
+double complex dipole_bessel_zk1(double complex z, double complex log_z);
+double complex dipole_bessel_zk1_complement(double complex z, double complex log_z);
 
 #endif

@@ -4,9 +4,10 @@
  * For one spatial frequency k the fluence phi(z) of each layer obeys
  *   -D phi'' + D q^2 phi = sigma_s' (down-going beam + up-going beam),   q^2 = sigma_tr^2 + k^2,
  * with phi/n^2 and the flux J = -D phi' continuous between layers, phi = 2 A D phi' at the top face and
- * phi = -2 A D phi' at the bottom face. It is solved from the bottom upwards by the affine relation
- * J = y phi + c between flux and fluence at each interface, in which only decaying exponentials occur,
- * so that layers of any thickness neither overflow nor cancel.
+ * phi = -2 A D phi' at the bottom face. What leaves by a face is the integral of the source times the
+ * solution psi without sources that meets the conditions at the other face and is 1 at this one. psi and
+ * its flux y psi are carried from face to face; all that occurs is a sum of terms which are positive at
+ * real k, so that no layer, thick or thin, loses digits.
  *
  * Everything is a dual number: value and derivative with respect to one parameter.
  */
@@ -47,6 +48,35 @@ static void beams_init(struct system *system)
     system->unscattered[DIPOLE_FACE_FAR] = system->is_half_space ? constant(0.0) : entering;
 }
 
+/* x_k = sign (x_(k-1) - g/k!)/a by whichever direction is stable: upwards from x_0, given, or downwards
+ * from x_24 = g/25!, whose error has died out before the moments that are kept. */
+static void moments_recur(struct dual a, double sign, struct dual g, struct dual x_0, struct dual *moments)
+{
+    double inverse_factorials[25] = { 1.0 };
+    for (int k = 1; k < 25; k++)
+        inverse_factorials[k] = inverse_factorials[k - 1] / k;
+    if (creal(a.v) >= 1.0) {
+        moments[0] = x_0;
+        for (int k = 1; k < SLAB_MOMENTS; k++)
+            moments[k] = scale(sign, divide(subtract(moments[k - 1], scale(inverse_factorials[k], g)), a));
+        return;
+    }
+    struct dual x = scale(inverse_factorials[24] / 25.0, g);
+    for (int k = 24; k > 0; k--) {
+        x = add(scale(inverse_factorials[k], g), scale(sign, multiply(a, x)));
+        if (k <= SLAB_MOMENTS)
+            moments[k - 1] = x;
+    }
+}
+
+/* With a = sigma_t' d: near_k = int_0^1 e^(-ax) (1 - x)^k/k! dx, far_k = int_0^1 e^(-ax) x^k/k! dx. */
+static void moments_init(struct slab *slab)
+{
+    const struct dual a = multiply(slab->sigma_t_prime, slab->thickness), x_0 = fade_mean(a);
+    moments_recur(a, -1.0, constant(1.0), x_0, slab->near_moments);
+    moments_recur(a, 1.0, slab->through, x_0, slab->far_moments);
+}
+
 void dipole_system_init(struct system *system, const dipole_layer *layers,
                         const dipole_coefficients *coefficients, size_t count, int parameter)
 {
@@ -67,6 +97,8 @@ void dipole_system_init(struct system *system, const dipole_layer *layers,
         const double thickness = is_infinite ? 0.0 : layers[i].thickness_mm;
         slab->thickness = (struct dual){ thickness, own == 2 ? thickness : 0.0 };
         slab->through = is_infinite ? constant(0.0) : decay(multiply(slab->sigma_t_prime, slab->thickness));
+        if (!is_infinite)
+            moments_init(slab);
         system->eta[i] = c->eta;
     }
     system->a_top = coefficients[0].boundary_a;
@@ -76,98 +108,140 @@ void dipole_system_init(struct system *system, const dipole_layer *layers,
 
 /* ---- one spatial frequency ------------------------------------------------------------------------ */
 
-/* What the way back down needs: phi(d) = (phi(0) - u_top) through + bottom. */
-struct descent {
-    struct dual through, bottom, u_top;
+/*
+ * One finite layer at one frequency, x measured from the side the integral runs to, d - x from the other:
+ * cosh qd and (sinh qd)/q; the integrals over the layer of the near beam, e^(-sigma_t' x), and of the far
+ * beam, e^(-sigma_t' (d - x)), times cosh q(d - x) and (sinh q(d - x))/q. All times `unit`, which is 1 or,
+ * in thick layers, e^(-qd).
+ */
+struct crossing {
+    struct dual unit, cosh, sinh, near_cosh, near_sinh, far_cosh, far_sinh, q2;
 };
 
-/*
- * One layer between the relation J = y phi + c at its bottom and the same at its top.
- *
- * phi = a e^(-qz) + b e^(-q(d - z)) + u(z), where u is the response to both beams that vanishes with each
- * beam's entry: u_down(z) = s_down (e^(-sigma_t' z) - e^(-qz))/(q^2 - sigma_t'^2), likewise from below.
- */
-static void climb(const struct slab *slab, struct dual q, struct dual *y, struct dual *c,
-                  struct descent *out)
+/* sum_n x^n series[stride n + first], for |x| < 1/4 to rounding if the terms fall as 1/(2n)!. */
+static struct dual power_series(const struct dual *series, int first, struct dual x)
 {
-    const struct dual d = slab->thickness, sigma_t = slab->sigma_t_prime, dq = multiply(slab->diffusion, q);
-    const struct dual sum = add(q, sigma_t), e = decay(multiply(q, d));
-    const struct dual per = divide(slab->sigma_s_prime, multiply(slab->diffusion, sum));
-    const struct dual s_down = multiply(per, slab->down), s_up = multiply(per, slab->up);
-    /* (e^(-sigma_t' d) - e^(-qd))/(q - sigma_t'), symmetric in its two rates: the smaller one is taken out
-     */
+    struct dual sum = series[SLAB_MOMENTS - 2 + first];
+    for (int n = SLAB_MOMENTS / 2 - 2; n >= 0; n--)
+        sum = add(multiply(sum, x), series[2 * n + first]);
+    return sum;
+}
+
+/* Functions of q^2 by their power series: no square root is taken, real stays real. */
+static struct crossing cross_thin(const struct slab *slab, struct dual q2)
+{
+    static const struct dual inverse_factorials[SLAB_MOMENTS + 1] = {
+        { 1.0, 0.0 },
+        { 1.0, 0.0 },
+        { 1.0 / 2, 0.0 },
+        { 1.0 / 6, 0.0 },
+        { 1.0 / 24, 0.0 },
+        { 1.0 / 120, 0.0 },
+        { 1.0 / 720, 0.0 },
+        { 1.0 / 5040, 0.0 },
+        { 1.0 / 40320, 0.0 },
+        { 1.0 / 362880, 0.0 },
+        { 1.0 / 3628800, 0.0 },
+        { 1.0 / 39916800, 0.0 },
+        { 1.0 / 479001600, 0.0 },
+        { 1.0 / 6227020800, 0.0 },
+        { 1.0 / 87178291200, 0.0 },
+        { 1.0 / 1307674368000, 0.0 },
+    };
+    const struct dual d = slab->thickness, d2 = multiply(d, d), x = multiply(q2, d2);
+    return (struct crossing){
+        .unit = constant(1.0),
+        .cosh = power_series(inverse_factorials, 0, x),
+        .sinh = multiply(d, power_series(inverse_factorials, 1, x)),
+        .near_cosh = multiply(d, power_series(slab->near_moments, 0, x)),
+        .near_sinh = multiply(d2, power_series(slab->near_moments, 1, x)),
+        .far_cosh = multiply(d, power_series(slab->far_moments, 0, x)),
+        .far_sinh = multiply(d2, power_series(slab->far_moments, 1, x)),
+        .q2 = q2,
+    };
+}
+
+/* With decaying exponentials only. The pole at q = sigma_t' is removable. */
+static struct crossing cross_thick(const struct slab *slab, struct dual q2)
+{
+    const struct dual q = root(q2), d = slab->thickness, sigma_t = slab->sigma_t_prime;
+    const struct dual e = decay(multiply(q, d)), e2 = multiply(e, e);
+    /* (1 - e^(-(q + sigma_t') d))/(q + sigma_t') and (e^(-sigma_t' d) - e^(-qd))/(q - sigma_t'), symmetric
+     * in its two rates: the smaller one is taken out */
+    const struct dual sum = multiply(d, fade_mean(multiply(add(q, sigma_t), d)));
     const struct dual gap = multiply(subtract(q, sigma_t), d);
     const struct dual mean = multiply(d, creal(gap.v) >= 0.0 ? multiply(slab->through, fade_mean(gap))
                                                              : multiply(e, fade_mean(scale(-1.0, gap))));
-    /* and the slope of u at the far end */
-    const struct dual far_slope = subtract(e, multiply(sigma_t, mean));
-    const struct dual u_bottom = multiply(s_down, mean), u_top = multiply(s_up, mean);
-    const struct dual slope_bottom = subtract(multiply(s_down, far_slope), s_up);
-    const struct dual slope_top = subtract(s_down, multiply(s_up, far_slope));
-
-    const struct dual total = add(dq, *y);
-    const struct dual w =
-        divide(add(add(multiply(slab->diffusion, slope_bottom), multiply(*y, u_bottom)), *c), total);
-    /* 1 + rho e^2 and 1 - rho e^2 with rho = (Dq - y)/(Dq + y), without cancellation in thin layers */
-    const struct dual e2 = multiply(e, e), open = fade(scale(2.0, multiply(q, d)));
-    const struct dual plus = add(open, divide(scale(2.0, multiply(e2, dq)), total));
-    const struct dual minus = add(open, divide(scale(2.0, multiply(e2, *y)), total));
-
-    /* q u - u' at the bottom, for s_down = 1: (q + sigma_t') mean - e, which cancels where q is small */
-    const struct dual rates = subtract(q, sigma_t);
-    const struct dual rest =
-        cabs(rates.v) > 0.5 * cabs(sigma_t.v)
-            ? divide(subtract(multiply(sum, slab->through), scale(2.0, multiply(q, e))), rates)
-            : subtract(multiply(sum, mean), e);
-    out->through = divide(scale(2.0, multiply(e, dq)), multiply(total, plus));
-    const struct dual leaving = multiply(slab->diffusion, add(multiply(s_down, rest), s_up));
-    out->bottom = add(multiply(multiply(w, e), out->through), divide(subtract(leaving, *c), total));
-    out->u_top = u_top;
-
-    *y = divide(multiply(dq, minus), plus);
-    *c = subtract(subtract(divide(scale(2.0, multiply(dq, multiply(w, e))), plus),
-                           multiply(slab->diffusion, slope_top)),
-                  multiply(*y, u_top));
+    struct crossing out = {
+        .unit = e,
+        .cosh = scale(0.5, add(constant(1.0), e2)),
+        .sinh = scale(0.5, divide(fade(scale(2.0, multiply(q, d))), q)),
+        .near_cosh = scale(0.5, add(sum, multiply(e, mean))),
+        .near_sinh = scale(0.5, divide(subtract(sum, multiply(e, mean)), q)),
+        .far_cosh = scale(0.5, add(mean, multiply(e, sum))),
+        .far_sinh = scale(0.5, divide(subtract(mean, multiply(e, sum)), q)),
+        .q2 = q2,
+    };
+    if (creal(sigma_t.v) > 2.0 * size(q.v)) /* where the two nearly cancel */
+        out.far_sinh =
+            divide(subtract(e, multiply(slab->through, add(out.cosh, multiply(sigma_t, out.sinh)))),
+                   subtract(multiply(sigma_t, sigma_t), q2));
+    return out;
 }
 
-/* q = sqrt(sigma_tr^2 + k^2). Where it is 0, a lossless layer at k = 0, the solution has a limit but the
- * formulas 0/0: a q of 1e-18 sigma_t' gives it to the last digit. */
-static struct dual rate(const struct slab *slab, double complex k2)
+static struct crossing cross(const struct slab *slab, double complex k2)
 {
     const struct dual q2 = { slab->sigma_tr2.v + k2, slab->sigma_tr2.d };
-    return q2.v == 0.0 ? constant(1e-18 * creal(slab->sigma_t_prime.v)) : root(q2);
+    return size(q2.v) * square(creal(slab->thickness.v)) < 0.25 ? cross_thin(slab, q2)
+                                                                : cross_thick(slab, q2);
+}
+
+/* psi from one side of a layer to the other: y, its flux over itself, and c, the integral of source x psi
+ * over psi, of all that has been passed. */
+static void pass(const struct slab *slab, const struct crossing *x, struct dual near_beam,
+                 struct dual far_beam, struct dual *y, struct dual *c)
+{
+    const struct dual y_d = divide(*y, slab->diffusion);
+    const struct dual psi = add(x->cosh, multiply(y_d, x->sinh));
+    const struct dual near = multiply(near_beam, add(x->near_cosh, multiply(y_d, x->near_sinh)));
+    const struct dual far = multiply(far_beam, add(x->far_cosh, multiply(y_d, x->far_sinh)));
+    const struct dual source = multiply(slab->sigma_s_prime, add(near, far));
+    *c = divide(add(source, multiply(x->unit, *c)), psi);
+    *y = divide(add(multiply(*y, x->cosh), multiply(slab->diffusion, multiply(x->q2, x->sinh))), psi);
 }
 
 /* R^(k) and T^(k) for k^2, complex; the square roots take the branch with positive real part. */
 void dipole_system_solve(const struct system *system, double complex k2, struct dual out[2])
 {
-    struct descent descents[DIPOLE_LAYER_LIMIT];
+    struct crossing crossings[DIPOLE_LAYER_LIMIT];
+    const size_t count = system->count;
+    const struct dual one = constant(1.0);
     struct dual y = constant(0.5 / system->a_bottom), c = constant(0.0);
-    for (size_t i = system->count; i-- > 0;) {
+    for (size_t i = count; i-- > 0;) {
         const struct slab *const slab = &system->slabs[i];
-        const struct dual q = rate(slab, k2);
-        if (i + 1 == system->count && system->is_half_space) {
+        if (i + 1 == count && system->is_half_space) {
+            const struct dual q = root((struct dual){ slab->sigma_tr2.v + k2, slab->sigma_tr2.d });
             y = multiply(slab->diffusion, q);
-            c = scale(-1.0, divide(multiply(slab->sigma_s_prime, slab->down), add(q, slab->sigma_t_prime)));
+            c = divide(multiply(slab->sigma_s_prime, slab->down), add(q, slab->sigma_t_prime));
         } else {
-            climb(slab, q, &y, &c, &descents[i]);
+            crossings[i] = cross(slab, k2);
+            pass(slab, &crossings[i], slab->down, slab->up, &y, &c);
         }
         if (i > 0) /* phi/n^2 is continuous: the layer above sees y (n_below/n_above)^2 */
             y = scale(square(system->eta[i] / system->eta[i - 1]), y);
     }
-    const struct dual one = constant(1.0);
-    out[DIPOLE_FACE_LIT] = scale(-1.0, divide(c, add(one, scale(2.0 * system->a_top, y))));
+    out[DIPOLE_FACE_LIT] = divide(c, add(one, scale(2.0 * system->a_top, y)));
     out[DIPOLE_FACE_FAR] = constant(0.0);
     if (system->is_half_space)
         return;
-    struct dual phi = scale(2.0 * system->a_top, out[DIPOLE_FACE_LIT]);
-    for (size_t i = 0; i < system->count; i++) {
-        const struct descent *const s = &descents[i];
-        phi = add(multiply(subtract(phi, s->u_top), s->through), s->bottom);
-        if (i + 1 < system->count)
-            phi = scale(square(system->eta[i + 1] / system->eta[i]), phi);
+    y = constant(0.5 / system->a_top), c = constant(0.0);
+    for (size_t i = 0; i < count; i++) {
+        const struct slab *const slab = &system->slabs[i];
+        pass(slab, &crossings[i], slab->up, slab->down, &y, &c);
+        if (i + 1 < count)
+            y = scale(square(system->eta[i] / system->eta[i + 1]), y);
     }
-    out[DIPOLE_FACE_FAR] = scale(0.5 / system->a_bottom, phi);
+    out[DIPOLE_FACE_FAR] = divide(c, add(one, scale(2.0 * system->a_bottom, y)));
 }
 
 /* ---- where the response is singular --------------------------------------------------------------- */
@@ -215,6 +289,8 @@ double dipole_system_first_singularity_per_mm(const struct system *system)
     for (size_t i = 0; i < system->count; i++)
         lo = fmin(lo, sqrt(creal(system->slabs[i].sigma_tr2.v)));
     double hi = sqrt(creal(system->slabs[system->count - 1].sigma_tr2.v));
+    if (system->is_half_space && is_below_first_singularity(system, hi))
+        return hi; /* the base's cut */
     if (!system->is_half_space) {
         hi = fmax(2.0 * lo, creal(system->slabs[0].sigma_t_prime.v));
         while (is_below_first_singularity(system, hi))

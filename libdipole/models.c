@@ -76,11 +76,13 @@ static double face_a(double eta, double eta_beyond)
 
 /* Light that enters a layer from above or below spreads as if a beam had entered it, per frequency:
  * R_12 = R_1 + T_1 R_2 T_1'/(1 - R_1' R_2), T_12 = T_1 T_2/(1 - R_1' R_2). Joined from the bottom upwards.
+ * Returns the smallest real part of 1 - R_1' R_2.
  */
-void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2])
+static double multipole_solve(const struct system *system, double complex k2, struct dual out[2])
 {
     struct dual r_below = constant(0.0), t_below = constant(1.0);
     const size_t count = system->count;
+    double smallest = 1.0;
     for (size_t i = count; i-- > 0;) {
         const struct slab *const slab = &system->slabs[i];
         struct dual q2 = slab->sigma_tr2;
@@ -100,7 +102,43 @@ void dipole_multipole_solve(const struct system *system, double complex k2, stru
         const struct dual loop = subtract(constant(1.0), multiply(r_up, r_below));
         r_below = add(r, divide(multiply(multiply(t, r_below), t_up), loop));
         t_below = divide(multiply(t, t_below), loop);
+        smallest = fmin(smallest, creal(loop.v));
     }
     out[DIPOLE_FACE_LIT] = r_below;
     out[DIPOLE_FACE_FAR] = t_below;
+    return smallest;
+}
+
+void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2])
+{
+    multipole_solve(system, k2, out);
+}
+
+/* The poles of each layer, sinh qL = 0, begin at sigma_tr^2 + (pi/L)^2, the base's cut at sigma_tr; between
+ * layers a pole is where 1 - R_1' R_2 becomes 0, which falls up to there. */
+double dipole_multipole_first_singularity_per_mm(const struct system *system)
+{
+    double lo = INFINITY, hi = INFINITY;
+    const size_t count = system->count;
+    for (size_t i = 0; i < count; i++) {
+        const struct slab *const slab = &system->slabs[i];
+        const double sigma_tr = sqrt(creal(slab->sigma_tr2.v));
+        const double a_0 = face_a(system->eta[i], i > 0 ? system->eta[i - 1] : 1.0);
+        const double a_1 = face_a(system->eta[i], i + 1 < count ? system->eta[i + 1] : 1.0);
+        const double all = creal(slab->thickness.v) + 2.0 * (a_0 + a_1) * creal(slab->diffusion.v);
+        const bool is_base = i + 1 == count && system->is_half_space;
+        lo = fmin(lo, sigma_tr);
+        hi = fmin(hi, is_base ? sigma_tr : hypot(sigma_tr, PI / all) * (1.0 - 1e-13));
+    }
+    struct dual f[2];
+    if (multipole_solve(system, -hi * hi, f) > 0.0)
+        return hi;
+    while (hi - lo > 1e-13 * hi && hi > 1e-200) {
+        const double middle = lo > 0.5 * hi ? 0.5 * (lo + hi) : fmax(sqrt(lo) * sqrt(hi), 0.1 * hi);
+        if (multipole_solve(system, -middle * middle, f) > 0.0)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    return lo;
 }

@@ -21,9 +21,8 @@ struct dipole_stack {
     struct system system;
     double r_floor_mm;               /* below it the profile goes on as a constant */
     double total[2], unscattered[2]; /* by dipole_face */
-    struct row row; /* of a half-space; count 0 for none; into the same allocation, as are the rest */
-    struct hankel hankel;
-    double complex (*values)[2]; /* weight x response of each node, by dipole_face */
+    struct row row;                  /* of a half-space; count 0 for none; into the same allocation */
+    struct hankel hankel[2];         /* by dipole_face; of models that are no row of sources */
 };
 
 /* The place of a layer, counted from the top, in the order in which the light meets them; and back. */
@@ -99,31 +98,31 @@ static bool coefficients_fill(dipole_stack *stack, dipole_status *status)
     return true;
 }
 
-/* Where R^ and T^ begin to be singular. Of the papers' models only a lower bound is known: the smallest
- * sigma_tr of a layer. */
+/* sigma_tr of the last layer as the model has it. */
+static double base_sigma_tr_per_mm(const dipole_stack *stack, dipole_model model)
+{
+    const dipole_coefficients *const c = &stack->coefficients[stack->count - 1];
+    const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
+    return model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
+                                               : c->sigma_tr_per_mm;
+}
+
+/* Where R^ and T^ begin to be singular. */
 static double singularity_per_mm(const dipole_stack *stack, dipole_model model)
 {
     if (model == DIPOLE_MODEL_BEAM)
         return dipole_system_first_singularity_per_mm(&stack->system);
-    double smallest = INFINITY;
-    for (size_t i = 0; i < stack->count; i++) {
-        const dipole_coefficients *const c = &stack->coefficients[i];
-        const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
-        smallest =
-            fmin(smallest, model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
-                                                               : c->sigma_tr_per_mm);
-    }
-    return smallest;
+    if (model == DIPOLE_MODEL_MULTIPOLE)
+        return dipole_multipole_first_singularity_per_mm(&stack->system);
+    return base_sigma_tr_per_mm(stack, model);
 }
 
-static void lengths_find(const dipole_stack *stack, double *shortest_mm, double *longest_mm)
+static double shortest_length_mm(const dipole_stack *stack)
 {
-    *shortest_mm = INFINITY;
-    *longest_mm = 0.0;
-    for (size_t i = 0; i < stack->count; i++) {
-        *shortest_mm = fmin(*shortest_mm, stack->coefficients[i].mean_free_path_mm);
-        *longest_mm = fmax(*longest_mm, stack->coefficients[i].mean_free_path_mm);
-    }
+    double shortest = INFINITY;
+    for (size_t i = 0; i < stack->count; i++)
+        shortest = fmin(shortest, stack->coefficients[i].mean_free_path_mm);
+    return shortest;
 }
 
 static void totals_fill(dipole_stack *stack, dipole_model model)
@@ -137,15 +136,43 @@ static void totals_fill(dipole_stack *stack, dipole_model model)
     }
 }
 
-static void nodes_fill(dipole_stack *stack)
+static double complex response_lit(const void *context, double complex k2)
 {
-    for (size_t j = 0; j < stack->hankel.node_count; j++) {
-        const struct hankel_node *const node = &stack->hankel.nodes[j];
-        struct dual f[2];
-        stack->response(&stack->system, -node->kappa * node->kappa, f);
-        for (int face = 0; face < 2; face++)
-            stack->values[j][face] = node->weight * f[face].v;
+    const dipole_stack *const stack = context;
+    struct dual f[2];
+    stack->response(&stack->system, k2, f);
+    return f[DIPOLE_FACE_LIT].v;
+}
+
+static double complex response_far(const void *context, double complex k2)
+{
+    const dipole_stack *const stack = context;
+    struct dual f[2];
+    stack->response(&stack->system, k2, f);
+    return f[DIPOLE_FACE_FAR].v;
+}
+
+/* Everything but a row of sources: lay out and fill the contours of both faces. */
+static bool hankels_init(dipole_stack *stack, dipole_model model)
+{
+    static hankel_function *const responses[2] = { response_lit, response_far };
+    const size_t last = stack->count - 1;
+    const bool is_half_space = isinf(stack->layers[last].thickness_mm);
+    struct hankel_input input = {
+        .context = stack,
+        .singularity_per_mm = singularity_per_mm(stack, model),
+        .r_min_mm = stack->r_floor_mm,
+        .extent_mm = is_half_space ? stack->coefficients[last].mean_free_path_mm : 0.0,
+    };
+    for (size_t i = 0; i < stack->count; i++)
+        input.extent_mm += i < last || !is_half_space ? stack->layers[i].thickness_mm : 0.0;
+    input.is_cut = is_half_space && input.singularity_per_mm == base_sigma_tr_per_mm(stack, model);
+    for (int face = 0; face < 2; face++) {
+        input.response = responses[face];
+        if (!dipole_hankel_init(&stack->hankel[face], &input))
+            return false;
     }
+    return true;
 }
 
 /* The row of sources of a half-space, in 3 row.count doubles. */
@@ -188,31 +215,22 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
     dipole_system_init(&draft.system, draft.layers, draft.coefficients, count, -1);
     totals_fill(&draft, model);
 
-    double shortest_mm, longest_mm;
-    lengths_find(&draft, &shortest_mm, &longest_mm);
-    draft.r_floor_mm = 1e-9 * shortest_mm;
+    draft.r_floor_mm = 1e-9 * shortest_length_mm(&draft);
     const bool is_half_space = count == 1 && isinf(layers[0].thickness_mm);
     if (is_half_space && model == DIPOLE_MODEL_BEAM)
         draft.row.count = dipole_row_beam_count(&draft.coefficients[0]);
     else if (is_half_space && model != DIPOLE_MODEL_BETTER_DIPOLE)
         draft.row.count = 2;
-    else
-        dipole_hankel_plan(&draft.hankel, singularity_per_mm(&draft, model), draft.r_floor_mm, longest_mm);
 
-    const size_t node_count = draft.hankel.node_count;
-    dipole_stack *const stack =
-        malloc(sizeof *stack + node_count * (sizeof *stack->hankel.nodes + sizeof *stack->values) +
-               3 * draft.row.count * sizeof(double));
+    dipole_stack *const stack = malloc(sizeof *stack + 3 * draft.row.count * sizeof(double));
     if (stack == NULL)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
     *stack = draft;
-    struct hankel_node *const nodes = (struct hankel_node *)(stack + 1);
-    stack->values = (double complex(*)[2])(nodes + node_count);
     if (stack->row.count > 0) {
-        row_fill(stack, (double *)(stack->values + node_count));
-    } else {
-        dipole_hankel_fill(&stack->hankel, nodes);
-        nodes_fill(stack);
+        row_fill(stack, (double *)(stack + 1));
+    } else if (!hankels_init(stack, model)) {
+        dipole_stack_destroy(stack);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
     }
     *stack_out = stack;
     return true;
@@ -220,6 +238,10 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
 
 void dipole_stack_destroy(dipole_stack *stack)
 {
+    if (stack == NULL)
+        return;
+    for (int face = 0; face < 2; face++)
+        dipole_hankel_clear(&stack->hankel[face]);
     free(stack);
 }
 
@@ -259,15 +281,6 @@ double dipole_stack_spectrum(const dipole_stack *stack, dipole_face face, double
     return fmax(creal(f[face].v), 0.0);
 }
 
-static double contour_sum(const dipole_stack *stack, dipole_face face, struct hankel_range range,
-                          double complex (*kernel)(double complex, double), double r_mm)
-{
-    double sum = 0.0;
-    for (size_t j = range.first; j < range.first + range.count; j++)
-        sum += cimag(stack->values[j][face] * kernel(stack->hankel.nodes[j].kappa, r_mm));
-    return sum;
-}
-
 /* The row of sources of what a face sends out; of the far face of a half-space nothing. */
 static double row_profile(const dipole_stack *stack, dipole_face face, double r_mm)
 {
@@ -287,8 +300,7 @@ static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
     if (isinf(r_mm))
         return 0.0;
     const double r = fmax(r_mm, stack->r_floor_mm);
-    return fmax(0.0, contour_sum(stack, face, dipole_hankel_range_for(&stack->hankel, r),
-                                 dipole_hankel_profile_kernel, r));
+    return fmax(0.0, dipole_hankel_profile(&stack->hankel[face], r));
 }
 
 void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face, const double *r_mm,
@@ -315,9 +327,7 @@ double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r
         return 0.0;
     if (r_mm < stack->r_floor_mm)
         return stack->total[face];
-    const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r_mm);
-    return fmax(0.0, dipole_hankel_start_share(&stack->hankel) * stack->total[face] +
-                         contour_sum(stack, face, range, dipole_hankel_beyond_kernel, r_mm));
+    return fmin(stack->total[face], fmax(0.0, dipole_hankel_beyond(&stack->hankel[face], r_mm)));
 }
 
 double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r_mm)
@@ -336,9 +346,7 @@ double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r
     const double beyond = dipole_stack_beyond(stack, face, r_mm);
     if (beyond < 0.5 * stack->total[face])
         return stack->total[face] - beyond;
-    return fmax(0.0,
-                fmin(stack->total[face], contour_sum(stack, face, dipole_hankel_range_all(&stack->hankel),
-                                                     dipole_hankel_within_kernel, r_mm)));
+    return fmin(stack->total[face], fmax(0.0, dipole_hankel_within(&stack->hankel[face], r_mm)));
 }
 
 /* The mean over a wide ring from the power beyond its edges; over a narrow one, where that would cancel, by
@@ -374,57 +382,91 @@ double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face fac
     return sum;
 }
 
+/* ---- radii and spacings ----------------------------------------------------------------------------- */
+
+struct question {
+    const dipole_stack *stack;
+    dipole_face face;
+    double target;
+    bool is_within;
+};
+
+/* log of a falling function of e^log_x over its target. What has underflown is as good as 1e-308. */
+typedef double falling_log(const struct question *question, double log_x);
+
+/*
+ * The root, to rounding, by Chandrupatla's method: inverse quadratic interpolation where it is safe, else
+ * bisection. The root is sought around log_start with ever longer strides.
+ */
+static double root_find(falling_log *f, const struct question *question, double log_start)
+{
+    double b = log_start, f_b = f(question, b), stride = f_b > 0.0 ? 0.7 : -0.7;
+    double a = b + stride, f_a = f(question, a);
+    while ((f_a > 0.0) == (f_b > 0.0)) {
+        b = a, f_b = f_a;
+        stride *= 2.0;
+        a += stride, f_a = f(question, a);
+    }
+    double c = a, f_c = f_a, share = 0.5;
+    for (;;) {
+        const double x = a + share * (b - a), f_x = f(question, x);
+        if ((f_x > 0.0) == (f_a > 0.0)) {
+            c = a, f_c = f_a;
+        } else {
+            c = b, f_c = f_b;
+            b = a, f_b = f_a;
+        }
+        a = x, f_a = f_x;
+        const double best = fabs(f_a) < fabs(f_b) ? a : b;
+        const double smallest = 2e-16 * fmax(1.0, fabs(best)) / fabs(b - a);
+        if (f_a == 0.0 || !(smallest < 0.5))
+            return best;
+        const double xi = (a - b) / (c - b), phi = (f_a - f_b) / (f_c - f_b);
+        share = phi * phi < xi && square(1.0 - phi) < 1.0 - xi
+                    ? f_a / (f_b - f_a) * f_c / (f_b - f_c) +
+                          (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+                    : 0.5;
+        share = fmax(smallest, fmin(1.0 - smallest, share));
+    }
+}
+
+static double reach_log(const struct question *question, double log_r)
+{
+    const double r_mm = exp(log_r);
+    if (question->is_within)
+        return -log(fmax(1e-308, dipole_stack_within(question->stack, question->face, r_mm)) /
+                    question->target);
+    return log(fmax(1e-308, dipole_stack_beyond(question->stack, question->face, r_mm)) / question->target);
+}
+
+static double spectrum_log(const struct question *question, double log_k)
+{
+    const double f = dipole_stack_spectrum(question->stack, question->face, exp(log_k));
+    return log(fmax(1e-308, f) / question->target);
+}
+
 double dipole_stack_r_max_mm(const dipole_stack *stack, dipole_face face, double epsilon)
 {
     if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 1.0))
         return NAN;
-    const double target = epsilon * stack->total[face];
-    if (!(target > 0.0))
+    const bool is_within = epsilon > 0.5;
+    const double target = (is_within ? 1.0 - epsilon : epsilon) * stack->total[face];
+    if (!(target > 1e-307))
         return 0.0;
-    /* the power beyond falls from the total at 0: double, then halve, in log r */
-    double lo = stack->r_floor_mm, hi = stack->coefficients[0].mean_free_path_mm;
-    while (dipole_stack_beyond(stack, face, hi) > target) {
-        lo = hi;
-        hi *= 2.0;
-    }
-    while (hi > lo * (1.0 + 4e-16)) {
-        const double middle = hi > 1.1 * lo ? sqrt(lo) * sqrt(hi) : lo + 0.5 * (hi - lo);
-        if (middle <= lo || middle >= hi)
-            break;
-        if (dipole_stack_beyond(stack, face, middle) > target)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    return hi;
+    const struct question question = { stack, face, target, is_within };
+    return exp(root_find(reach_log, &question, log(stack->coefficients[0].mean_free_path_mm)));
 }
 
-/* log of spectrum(k)/spectrum(0) over epsilon/4, which falls with k; bisected in log k. */
 double dipole_stack_splat_spacing_mm(const dipole_stack *stack, dipole_face face, double epsilon)
 {
     if (!(epsilon >= DIPOLE_EPSILON_MIN && epsilon < 4.0))
         return NAN;
     const double target = 0.25 * epsilon * stack->total[face];
-    if (!(target > 0.0))
+    if (!(target > 1e-307))
         return INFINITY;
-    double lo = 0.0, hi = stack->coefficients[0].sigma_t_prime_per_mm;
-    while (dipole_stack_spectrum(stack, face, hi) > target) {
-        lo = hi;
-        hi *= 2.0;
-    }
-    while (lo == 0.0) {
-        if (dipole_stack_spectrum(stack, face, 0.5 * hi) > target)
-            lo = 0.5 * hi;
-        else
-            hi *= 0.5;
-    }
-    for (double middle; middle = 0.5 * (lo + hi), middle > lo && middle < hi;) {
-        if (dipole_stack_spectrum(stack, face, middle) > target)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    return 2.0 * PI / hi;
+    const struct question question = { stack, face, target, false };
+    return 2.0 * PI /
+           exp(root_find(spectrum_log, &question, log(stack->coefficients[0].sigma_t_prime_per_mm)));
 }
 
 /* ---- derivatives ---------------------------------------------------------------------------------- */
@@ -450,6 +492,40 @@ dipole_stack_gradient dipole_stack_total_gradient(const dipole_stack *stack, dip
     return gradient;
 }
 
+/* Adds what the nodes of one contour give to the gradients at those radii that it serves. Each node is
+ * solved once per parameter and its kernel evaluated once per radius. */
+static void contour_gradient(const dipole_stack *stack, const struct system systems[3], dipole_face face,
+                             const struct hankel_contour *contour, const double *r_mm, size_t count,
+                             dipole_stack_gradient *gradients)
+{
+    const struct hankel *const hankel = &stack->hankel[face];
+    for (size_t j = contour->first; j < contour->first + contour->count; j++) {
+        const struct hankel_node *const node = &hankel->nodes[j];
+        double complex terms[3];
+        bool is_solved = false;
+        for (size_t i = 0; i < count; i++) {
+            if (!(r_mm[i] >= 0.0) || isinf(r_mm[i]))
+                continue;
+            const double r = fmin(fmax(r_mm[i], stack->r_floor_mm), hankel->r_far_mm);
+            if (dipole_hankel_contour_for(hankel, r) != contour ||
+                !dipole_hankel_is_needed(contour, node, r))
+                continue;
+            for (int parameter = 0; !is_solved && parameter < 3; parameter++) {
+                struct dual f[2];
+                stack->response(&systems[parameter], -node->kappa * node->kappa, f);
+                terms[parameter] = contour->angle > 0.0 ? node->weight * f[face].d
+                                                        : I * (creal(node->weight) * cimag(f[face].d));
+            }
+            is_solved = true;
+            const double complex kernel = dipole_bessel_k0(node->kappa * r, node->log_kappa + log(r)) *
+                                          dipole_hankel_far_factor(hankel, r_mm[i]);
+            gradients[i].d_log_sigma_a += cimag(terms[0] * kernel);
+            gradients[i].d_log_sigma_s_prime += cimag(terms[1] * kernel);
+            gradients[i].d_log_thickness += cimag(terms[2] * kernel);
+        }
+    }
+}
+
 void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, size_t layer,
                                    const double *r_mm, size_t count, dipole_stack_gradient *gradients)
 {
@@ -466,23 +542,11 @@ void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, 
     }
     if (stack->row.count > 0)
         return;
-    for (int parameter = 0; parameter < 3; parameter++) {
-        struct system system;
-        dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
+    struct system systems[3];
+    for (int parameter = 0; parameter < 3; parameter++)
+        dipole_system_init(&systems[parameter], stack->layers, stack->coefficients, stack->count,
                            3 * (int)place(stack, layer) + parameter);
-        for (size_t i = 0; i < count; i++) {
-            if (!(r_mm[i] >= 0.0) || isinf(r_mm[i]))
-                continue;
-            const double r = fmax(r_mm[i], stack->r_floor_mm);
-            const struct hankel_range range = dipole_hankel_range_for(&stack->hankel, r);
-            double sum = 0.0;
-            for (size_t j = range.first; j < range.first + range.count; j++) {
-                const struct hankel_node *const node = &stack->hankel.nodes[j];
-                struct dual f[2];
-                stack->response(&system, -node->kappa * node->kappa, f);
-                sum += cimag(node->weight * f[face].d * dipole_hankel_profile_kernel(node->kappa, r));
-            }
-            gradient_set(&gradients[i], parameter, sum);
-        }
-    }
+    const struct hankel *const hankel = &stack->hankel[face];
+    for (size_t i = 0; i < hankel->contour_count; i++)
+        contour_gradient(stack, systems, face, &hankel->contours[i], r_mm, count, gradients);
 }
