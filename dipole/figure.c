@@ -103,7 +103,7 @@ static void captions_init(const struct inspector_result *result, struct figure *
         figure->caption + size, sizeof figure->caption - (size_t)size,
         "η %.4g, dipole model. Dotted: mean free path ℓ = 1/(σa + σ′s). Dashed: r_max, the radius that "
         "holds all but %.3g %% of the light that leaves. Total: diffuse reflectance.",
-        result->material.medium[0].eta, 100 * result->epsilon);
+        result->material.layers[0][0].medium.eta, 100 * result->epsilon);
     figure->plot.title = figure->title;
     figure->plot.subtitle = result->material.source;
     figure->plot.caption = figure->caption;

@@ -35,7 +35,7 @@ bool inspector_result_derive(struct inspector_result *result, dipole_status *sta
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         struct inspector_channel *const channel = &result->channels[c];
         dipole_coefficients *const coefficients = &channel->coefficients;
-        if (!dipole_coefficients_init(&result->material.medium[c], coefficients, status))
+        if (!dipole_coefficients_init(&result->material.layers[c][0].medium, coefficients, status))
             return false;
         channel->name = io_channel_names[c];
         channel->diffuse_mean_free_path_mm = 1 / coefficients->sigma_tr_per_mm;

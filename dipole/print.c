@@ -103,7 +103,7 @@ void inspector_result_print(const struct inspector_result *result)
                                            { "r_max", "mm", r_max },
                                            { "splat_spacing", "mm", splat_spacing } };
 
-    const dipole_medium *const first = &result->material.medium[0];
+    const dipole_medium *const first = &result->material.layers[0][0].medium;
     printf("%s\n", result->material.name);
     if (result->material.source[0])
         printf("%s\n", result->material.source);
@@ -177,7 +177,7 @@ bool inspector_result_format_json(const struct inspector_result *result, char **
         is_done = json_array_append_new(channels, channel_to_json(result, &result->channels[c])) == 0;
     json_t *const root =
         is_done ? json_pack("{s:s, s:f, s:f, s:O}", "material", result->material.name, "epsilon",
-                            result->epsilon, "eta", result->material.medium[0].eta, "channels", channels)
+                            result->epsilon, "eta", result->material.layers[0][0].medium.eta, "channels", channels)
                 : NULL;
     *text_out = root ? io_json_format(root) : NULL;
     json_decref(root);

@@ -90,12 +90,12 @@ static void json_holds_what_the_library_says(void **state)
         assert_int_equal(json_object_size(result), 4);
         assert_string_equal(json_string_value(json_object_get(result, "material")), material.name);
         assert_true(number_of(result, "epsilon") == (is_default ? 0.01 : 0.003));
-        assert_true(number_of(result, "eta") == material.medium[0].eta);
+        assert_true(number_of(result, "eta") == material.layers[0][0].medium.eta);
         const json_t *const channels = json_object_get(result, "channels");
         assert_int_equal(json_array_size(channels), 3);
         for (size_t c = 0; c < 3; c++)
-            check_channel(json_array_get(channels, c), &material.medium[c], is_default ? 0.01 : 0.003,
-                          io_channel_names[c]);
+            check_channel(json_array_get(channels, c), &material.layers[c][0].medium,
+                          is_default ? 0.01 : 0.003, io_channel_names[c]);
         json_decref(result);
     }
 }
@@ -275,8 +275,8 @@ static void bad_input_is_named(void **state)
           "}",
           "2:2: unknown key \"sigmaa\", expected name, eta, model, fdr, sigma_a_per_mm, "
           "sigma_s_prime_per_mm, "
-          "sigma_s_per_mm, g, diffuse_reflectance, mean_free_path_mm, diffuse_mean_free_path_mm, source, "
-          "extras, fit" },
+          "sigma_s_per_mm, g, diffuse_reflectance, mean_free_path_mm, diffuse_mean_free_path_mm, layers, "
+          "source, extras, fit" },
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char expected[1024];
