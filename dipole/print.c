@@ -116,7 +116,6 @@ static void print_heads(const struct column *columns, size_t count, bool is_unit
 {
     for (size_t i = 0; i < count; i++)
         printf("  %*s", column_width(&columns[i]), is_unit ? columns[i].unit : columns[i].name);
-    printf("\n");
 }
 
 static void print_values(const struct inspector_channel *channel, size_t layer,
@@ -124,39 +123,48 @@ static void print_values(const struct inspector_channel *channel, size_t layer,
 {
     for (size_t i = 0; i < count; i++)
         printf("  %*.6g", column_width(&columns[i]), columns[i].value(channel, layer));
-    printf("\n");
 }
 
 static void print_columns(const struct inspector_result *result, const struct column *columns, size_t count)
 {
     printf("\n%-7s", "channel");
     print_heads(columns, count, false);
-    printf("%-7s", "");
+    printf("\n%-7s", "");
     print_heads(columns, count, true);
+    printf("\n");
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         printf("%-7s", result->channels[c].name);
         print_values(&result->channels[c], 0, columns, count);
+        printf("\n");
     }
 }
 
-/* Every layer in every channel, from the top. */
+static bool has_layer_names(const struct io_material *material)
+{
+    for (size_t i = 0; i < material->layer_count; i++)
+        if (material->layer_names[i][0])
+            return true;
+    return false;
+}
+
+/* Every layer in every channel, from the top; names come last, for they may be long. */
 static void print_layers(const struct inspector_result *result)
 {
     const struct io_material *const material = &result->material;
     printf("\n%-5s  %12s  %8s  %-7s", "layer", "thickness", "eta", "channel");
     print_heads(layer_columns, COUNT(layer_columns), false);
+    printf(has_layer_names(material) ? "  name\n" : "\n");
     printf("%-5s  %12s  %8s  %-7s", "", "mm", "1", "");
     print_heads(layer_columns, COUNT(layer_columns), true);
-    for (size_t i = 0; i < material->layer_count; i++) {
-        const dipole_layer *const layer = &material->layers[0][i];
-        if (material->layer_names[i][0])
-            printf("%s\n", material->layer_names[i]);
+    printf("\n");
+    for (size_t i = 0; i < material->layer_count; i++)
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            const dipole_layer *const layer = &material->layers[c][i];
             printf("%-5zu  %12.6g  %8.6g  %-7s", i + 1, layer->thickness_mm, layer->medium.eta,
                    result->channels[c].name);
             print_values(&result->channels[c], i, layer_columns, COUNT(layer_columns));
+            printf("%s%s\n", material->layer_names[i][0] ? "  " : "", material->layer_names[i]);
         }
-    }
 }
 
 static void print_profile(const struct inspector_result *result)
