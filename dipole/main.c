@@ -290,7 +290,7 @@ int main(int argc, char **argv)
             "r_lo_mm,r_hi_mm,rd_per_mm2[,sem]; tables of MCML runs with R_per_mm2 and R_sem_per_mm2 are "
             "read as well. Lines that begin with # are comments.\n\n"
             "  dipole marble --model dipole,beam --plot models.svg\n"
-            "  dipole marble_slab --lit-from below --at 0,1,5\n",
+            "  dipole layered/marble_slab --lit-from below --at 0,1,5\n",
         .options = table,
         .operand_min = 1,
         .operand_max = INT_MAX,

@@ -171,10 +171,10 @@ static void json_of_stacks_holds_what_the_library_says(void **state)
         { "skin1", "beam", "above" },
         { "skin1", "better_dipole", "above" },
         { "marble", "multipole", "above" },
-        { "skin_layered", "beam", "above" },
-        { "marble_slab", "beam", "above" },
-        { "marble_slab", "beam", "below" },
-        { "marble_slab", "multipole", "above" },
+        { "layered/skin", "beam", "above" },
+        { "layered/marble_slab", "beam", "above" },
+        { "layered/marble_slab", "beam", "below" },
+        { "layered/marble_slab", "multipole", "above" },
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char path[4096];
@@ -536,7 +536,7 @@ static void plots_overlay_models_and_data(void **state)
     size_t size = 0;
     write_text("a.csv", "r_mm,rd_per_mm2,sem\n1,0.03,0.02\n2,0.01,1e-9\n4,-1,1\n0,1,1\n");
     write_text("b.csv", "r_lo_mm,r_hi_mm,R_per_mm2,R_sem_per_mm2\n0,1,0.2,0.001\n");
-    run_tool(&run, "dipole", "marble_slab", "--model", "multipole,beam", "--plot", "p.svg", "--data",
+    run_tool(&run, "dipole", "layered/marble_slab", "--model", "multipole,beam", "--plot", "p.svg", "--data",
              "a.csv", "--data", "./b.csv", "--per-incident");
     assert_done(&run);
     assert_true(io_file_read("p.svg", 1 << 20, &svg, &size, NULL));
@@ -559,7 +559,7 @@ static void plots_overlay_models_and_data(void **state)
     assert_int_equal(count_of(svg, "h8M"), 1);      /* the one bar that is long enough */
     free(svg);
 
-    run_tool(&run, "dipole", "marble", "skin1", "skin_layered", "marble_slab", "--plot", "p.svg");
+    run_tool(&run, "dipole", "marble", "skin1", "layered/skin", "layered/marble_slab", "--plot", "p.svg");
     assert_done(&run);
     assert_true(io_file_read("p.svg", 1 << 20, &svg, &size, NULL));
     static const char *const names[] = { ">How far light ", ">R, Marble, dipole, reflected 83 %<",
@@ -581,15 +581,15 @@ static void what_models_and_data_cannot_do_is_named(void **state)
     assert_int_equal(run.exit_code, 1);
     assert_non_null(strstr(run.err, ": cannot be lit from below, expected layers of which the last has a "
                                     "thickness\n"));
-    run_tool(&run, "dipole", "skin_layered", "--model", "beam,dipole", "--plot", "p.svg");
+    run_tool(&run, "dipole", "layered/skin", "--model", "beam,dipole", "--plot", "p.svg");
     assert_failed(
         &run, 1,
-        "dipole: skin_layered: --model dipole: this model knows only a half-space, expected \"beam\" "
+        "dipole: layered/skin: --model dipole: this model knows only a half-space, expected \"beam\" "
         "or \"multipole\" for layers\n");
-    run_tool(&run, "dipole", "skin_layered", "--model", "multipole");
+    run_tool(&run, "dipole", "layered/skin", "--model", "multipole");
     assert_failed(
         &run, 1,
-        "dipole: skin_layered: --model multipole: layers[0] is 0.1 mm thick, and the source of the "
+        "dipole: layered/skin: --model multipole: layers[0] is 0.1 mm thick, and the source of the "
         "multipole lies 0.199601 mm deep, below it; expected a thicker layer, or the model \"beam\", "
         "which has no limit\n");
     run_tool(&run, "dipole", "marble", "--plot", "p.svg", "--data", "p.csv");
