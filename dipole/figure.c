@@ -62,7 +62,7 @@ static void append(char *buffer, size_t size, const char *format, ...)
 static bool has_one_name(const struct inspector_figure *request)
 {
     for (size_t i = 1; i < request->result_count; i++)
-        if (strcmp(request->results[i]->material.name, request->results[0]->material.name) != 0)
+        if (strcmp(request->results[i].material.name, request->results[0].material.name) != 0)
             return false;
     return true;
 }
@@ -70,7 +70,7 @@ static bool has_one_name(const struct inspector_figure *request)
 static bool has_one_model(const struct inspector_figure *request)
 {
     for (size_t i = 1; i < request->result_count; i++)
-        if (request->results[i]->material.model != request->results[0]->material.model)
+        if (request->results[i].material.model != request->results[0].material.model)
             return false;
     return true;
 }
@@ -78,7 +78,7 @@ static bool has_one_model(const struct inspector_figure *request)
 static bool has_any_far_face(const struct inspector_figure *request)
 {
     for (size_t i = 0; i < request->result_count; i++)
-        if (inspector_has_far_face(request->results[i]))
+        if (inspector_has_far_face(&request->results[i]))
             return true;
     return false;
 }
@@ -115,8 +115,8 @@ static void limits_extend_by_data(const struct io_profile *profile, double scale
             continue;
         limits->x_min = fmin(limits->x_min, r_mm / 1.1);
         limits->x_max = fmax(limits->x_max, r_mm * 1.1);
-        limits->y_min = fmin(limits->y_min, fmax(value / 2, curves.y_min / 100));
-        limits->y_max = fmax(limits->y_max, fmin(value * 2, curves.y_max * 100));
+        limits->y_min = fmin(limits->y_min, fmax(value / 2, curves.y_min / 10));
+        limits->y_max = fmax(limits->y_max, fmin(value * 2, curves.y_max * 10));
     }
 }
 
@@ -125,8 +125,8 @@ static struct limits limits_find(const struct inspector_figure *request, double 
     struct limits limits = { .x_min = INFINITY, .y_min = INFINITY };
     for (size_t i = 0; i < request->result_count; i++)
         for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            limits_extend(&request->results[i]->channels[c], inspector_has_far_face(request->results[i]),
-                          request->results[i]->epsilon, &limits);
+            limits_extend(&request->results[i].channels[c], inspector_has_far_face(&request->results[i]),
+                          request->results[i].epsilon, &limits);
     for (size_t i = 0; i < request->data_count; i++)
         limits_extend_by_data(request->data[i].profile, data_scale, &limits);
     limits.y_min = fmax(limits.y_min, limits.y_max * AXIS_DEPTH);
@@ -152,14 +152,28 @@ static void axes_init(const struct inspector_figure *request, const struct limit
 
 /* ---- curves -------------------------------------------------------------------------------------- */
 
-/* At most 24 characters of a name. */
+/* Bytes of the first count characters of UTF-8 text, or of all of it. */
+static size_t bytes_of(const char *text, size_t count)
+{
+    size_t length = 0;
+    for (size_t i = 0; text[length] && i < count; i++)
+        for (length++; ((unsigned char)text[length] & 0xc0) == 0x80;)
+            length++;
+    return length;
+}
+
+/* A name of more than 24 characters loses its middle: names of a kind differ at their ends. */
 static void append_name(char *buffer, size_t size, const char *name)
 {
-    size_t length = 0, character_count = 0;
-    for (; name[length] && character_count < 24; character_count++)
-        for (length++; ((unsigned char)name[length] & 0xc0) == 0x80;)
-            length++;
-    append(buffer, size, ", %.*s%s", (int)length, name, name[length] ? "…" : "");
+    enum { HEAD = 12, TAIL = 11 };
+    size_t count = 0;
+    for (const char *p = name; *p; p++)
+        count += ((unsigned char)*p & 0xc0) != 0x80;
+    if (count <= HEAD + 1 + TAIL)
+        append(buffer, size, "%s", name);
+    else
+        append(buffer, size, "%.*s…%s", (int)bytes_of(name, HEAD), name,
+               name + bytes_of(name, count - TAIL));
 }
 
 static void label_init(const struct inspector_figure *request, const struct inspector_result *result,
@@ -168,8 +182,10 @@ static void label_init(const struct inspector_figure *request, const struct insp
     const double total =
         face == DIPOLE_FACE_LIT ? channel->diffuse_reflectance : channel->diffuse_transmittance;
     snprintf(out, size, "%s", channel->name);
-    if (!has_one_name(request))
+    if (!has_one_name(request)) {
+        append(out, size, ", ");
         append_name(out, size, result->material.name);
+    }
     if (!has_one_model(request))
         append(out, size, ", %s", inspector_model_name(result->material.model));
     if (!(total > 0))
@@ -186,7 +202,7 @@ static void label_init(const struct inspector_figure *request, const struct insp
 static void curve_add(const struct inspector_figure *request, size_t index, int c, dipole_face face,
                       struct figure *figure)
 {
-    const struct inspector_result *const result = request->results[index];
+    const struct inspector_result *const result = &request->results[index];
     const struct inspector_channel *const channel = &result->channels[c];
     const bool is_alone = request->result_count == 1, is_far = face == DIPOLE_FACE_FAR;
     const size_t line = figure->line_count++;
@@ -209,7 +225,7 @@ static void curves_add(const struct inspector_figure *request, struct figure *fi
     for (size_t i = 0; i < request->result_count; i++)
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
             curve_add(request, i, c, DIPOLE_FACE_LIT, figure);
-            if (inspector_has_far_face(request->results[i]))
+            if (inspector_has_far_face(&request->results[i]))
                 curve_add(request, i, c, DIPOLE_FACE_FAR, figure);
         }
 }
@@ -287,7 +303,6 @@ static bool data_add(const struct inspector_data *data, size_t index, const stru
     points_fill(profile, figure->data_scale, limits, rows, points);
     free(rows);
     append_name(points->label, sizeof points->label, data->label);
-    memmove(points->label, points->label + 2, strlen(points->label) - 1); /* without ", " */
     if (points->count < profile->count)
         append(points->label, sizeof points->label, ", %zu of %zu", points->count, profile->count);
     const bool has_errors = profile->sem_per_mm2 != NULL;
@@ -357,7 +372,7 @@ static void caption_of_several(const struct inspector_figure *request, char *out
     const bool has_one = has_one_name(request);
     append(out, size, "Lines: ");
     for (size_t i = 0; i < request->result_count; i++) {
-        const struct io_material *const material = &request->results[i]->material;
+        const struct io_material *const material = &request->results[i].material;
         append(out, size, "%s %s%s%s model", dash_names[i], has_one ? "" : material->name,
                has_one ? "" : ", ", inspector_model_name(material->model));
         if (!io_material_has_layers(material))
@@ -366,7 +381,7 @@ static void caption_of_several(const struct inspector_figure *request, char *out
     }
     if (has_any_far_face(request))
         append(out, size, "Thick lines: reflected, thin lines: transmitted; lit from %s. ",
-               request->results[0]->side == DIPOLE_FROM_ABOVE ? "above" : "below");
+               request->results[0].side == DIPOLE_FROM_ABOVE ? "above" : "below");
     else
         append(out, size, "Total: diffuse reflectance. ");
 }
@@ -393,16 +408,16 @@ static void append_data_caption(const struct inspector_figure *request, const st
 static void texts_init(const struct inspector_figure *request, struct figure *figure)
 {
     snprintf(figure->title, sizeof figure->title, "%s%sow far light spreads under the surface",
-             has_one_name(request) ? request->results[0]->material.name : "",
+             has_one_name(request) ? request->results[0].material.name : "",
              has_one_name(request) ? ": h" : "H");
     if (request->result_count == 1)
-        caption_of_one(request->results[0], figure->caption, sizeof figure->caption);
+        caption_of_one(&request->results[0], figure->caption, sizeof figure->caption);
     else
         caption_of_several(request, figure->caption, sizeof figure->caption);
     if (request->data_count > 0)
         append_data_caption(request, figure, figure->caption, sizeof figure->caption);
     figure->plot.title = figure->title;
-    figure->plot.subtitle = has_one_name(request) ? request->results[0]->material.source : NULL;
+    figure->plot.subtitle = has_one_name(request) ? request->results[0].material.source : NULL;
     figure->plot.caption = figure->caption;
 }
 
@@ -422,7 +437,7 @@ static bool figure_init(const struct inspector_figure *request, struct figure *f
     figure->plot = (struct plot){ .series = figure->series,
                                   .markers = figure->markers,
                                   .has_legend = request->result_count > 1 || request->data_count > 0 };
-    figure->data_scale = request->is_per_incident ? 1 / entering_part(request->results[0]) : 1;
+    figure->data_scale = request->is_per_incident ? 1 / entering_part(&request->results[0]) : 1;
     const struct limits limits = limits_find(request, figure->data_scale);
     axes_init(request, &limits, figure);
     curves_add(request, figure);
@@ -431,7 +446,7 @@ static bool figure_init(const struct inspector_figure *request, struct figure *f
             return false;
     /* Dots come last, so that no line covers one. */
     for (int c = 0; c < IO_CHANNEL_COUNT && request->result_count == 1; c++)
-        markers_add(&request->results[0]->channels[c], c, figure);
+        markers_add(&request->results[0].channels[c], c, figure);
     texts_init(request, figure);
     return true;
 }

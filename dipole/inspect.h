@@ -58,8 +58,8 @@ void inspector_result_print(const struct inspector_result *result);
 
 /* One result as a JSON object, several as { "materials": [...] }; numbers with as few digits as give them
  * back. The caller frees it. */
-DIPOLE_CHECKED bool inspector_results_format_json(const struct inspector_result *const *results,
-                                                  size_t count, char **text_out, dipole_status *status);
+DIPOLE_CHECKED bool inspector_results_format_json(const struct inspector_result *results, size_t count,
+                                                  char **text_out, dipole_status *status);
 
 /* A table to draw beside the curves. */
 struct inspector_data {
@@ -68,7 +68,7 @@ struct inspector_data {
 };
 
 struct inspector_figure {
-    const struct inspector_result *const *results; /* 1 to INSPECTOR_CURVE_LIMIT */
+    const struct inspector_result *results; /* 1 to INSPECTOR_CURVE_LIMIT */
     size_t result_count;
     const struct inspector_data *data; /* at most INSPECTOR_DATA_LIMIT */
     size_t data_count;

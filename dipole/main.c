@@ -23,7 +23,7 @@ struct options {
 
 /* Everything that is read and derived. */
 struct job {
-    struct inspector_result **results;
+    struct inspector_result *results;
     size_t result_count;
     struct inspector_data data[INSPECTOR_DATA_LIMIT];
     struct io_profile *profiles[INSPECTOR_DATA_LIMIT];
@@ -104,10 +104,7 @@ static bool add_result(const struct options *options, const char *path, const st
                        const dipole_model *model, struct job *job, dipole_status *status)
 {
     const dipole_place place = { .source = path };
-    struct inspector_result *const result = calloc(1, sizeof *result);
-    if (!result)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory");
-    job->results[job->result_count++] = result;
+    struct inspector_result *const result = &job->results[job->result_count++];
     *result = (struct inspector_result){ .material = *material,
                                          .side = (dipole_side)options->side,
                                          .epsilon = options->epsilon,
@@ -154,10 +151,7 @@ static bool read_data(const struct options *options, struct job *job, dipole_sta
 
 static bool write_plot(const struct options *options, const struct job *job, dipole_status *status)
 {
-    const struct inspector_result *results[INSPECTOR_CURVE_LIMIT];
-    for (size_t i = 0; i < job->result_count; i++)
-        results[i] = job->results[i];
-    const struct inspector_figure figure = { .results = results,
+    const struct inspector_figure figure = { .results = job->results,
                                              .result_count = job->result_count,
                                              .data = job->data,
                                              .data_count = options->data_paths.count,
@@ -177,13 +171,12 @@ static bool print_results(const struct job *job, bool is_json, dipole_status *st
         for (size_t i = 0; i < job->result_count; i++) {
             if (i > 0)
                 printf("\n");
-            inspector_result_print(job->results[i]);
+            inspector_result_print(&job->results[i]);
         }
         return cli_stdout_finish(status);
     }
     char *text = NULL;
-    if (!inspector_results_format_json((const struct inspector_result *const *)job->results,
-                                       job->result_count, &text, status))
+    if (!inspector_results_format_json(job->results, job->result_count, &text, status))
         return false;
     fputs(text, stdout);
     free(text);
@@ -202,10 +195,8 @@ static bool run(const struct cli_tool *tool, const struct options *options, char
     is_done = is_done && read_data(options, &job, status) &&
               (!options->plot_path || write_plot(options, &job, status)) &&
               print_results(&job, options->common.json, status);
-    for (size_t i = 0; i < job.result_count; i++) {
-        inspector_result_end(job.results[i]);
-        free(job.results[i]);
-    }
+    for (size_t i = 0; i < job.result_count; i++)
+        inspector_result_end(&job.results[i]);
     free(job.results);
     for (size_t i = 0; i < INSPECTOR_DATA_LIMIT; i++)
         io_profile_destroy(job.profiles[i]);

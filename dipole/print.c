@@ -302,13 +302,13 @@ static json_t *result_to_json(const struct inspector_result *result)
                      "eta", result->material.layers[0][0].medium.eta, "channels", channels);
 }
 
-bool inspector_results_format_json(const struct inspector_result *const *results, size_t count,
-                                   char **text_out, dipole_status *status)
+bool inspector_results_format_json(const struct inspector_result *results, size_t count, char **text_out,
+                                   dipole_status *status)
 {
     json_t *const materials = json_array();
     bool is_done = materials != NULL;
     for (size_t i = 0; i < count && is_done; i++)
-        is_done = append(materials, result_to_json(results[i]));
+        is_done = append(materials, result_to_json(&results[i]));
     json_t *const several = is_done ? json_pack("{s:O}", "materials", materials) : NULL;
     json_t *const root = is_done && count == 1 ? json_array_get(materials, 0) : several;
     *text_out = root ? io_json_format(root) : NULL;

@@ -485,7 +485,8 @@ static void what_is_written_is_read_back(void **state)
                 k > 0 && has_one_eta ? material.layers[0][0].medium.eta : uniform(&rng, 1.0, 2.0);
             const bool is_infinite = k + 1 == material.layer_count && (!has_layers || i % 3 == 0);
             const double thickness_mm = is_infinite ? INFINITY : log_uniform(&rng, 1e-3, 1e2);
-            snprintf(material.layer_names[k], sizeof *material.layer_names, k % 2 ? "" : "l %zu", k);
+            if (k % 2 == 0)
+                snprintf(material.layer_names[k], sizeof *material.layer_names, "l %zu", k);
             for (int c = 0; c < 3; c++)
                 material.layers[c][k] =
                     (dipole_layer){ .medium = { .sigma_a_per_mm = log_uniform(&rng, 1e-4, 1e2),

@@ -170,19 +170,20 @@ static void failures_name_line_and_column(void **state)
 static void sizes_are_bounded(void **state)
 {
     (void)state;
+    static const char row[] = "1,2\n";
     const size_t size = 32 + 4 * (IO_PROFILE_ROW_LIMIT + 1);
     char *const text = malloc(size);
     assert_non_null(text);
     struct io_profile *profile;
     dipole_status status;
-    size_t length = (size_t)sprintf(text, "r_mm,rd_per_mm2\n");
-    for (size_t i = 0; i < IO_PROFILE_ROW_LIMIT; i++, length += 4)
-        memcpy(text + length, "1,2\n", 4);
-    assert_true(io_profile_parse(text, length, "p.csv", &profile, &status));
+    const size_t header = (size_t)sprintf(text, "r_mm,rd_per_mm2\n");
+    for (size_t i = 0; i < 4 * (IO_PROFILE_ROW_LIMIT + 1); i++)
+        text[header + i] = row[i % 4];
+    assert_true(io_profile_parse(text, header + 4 * IO_PROFILE_ROW_LIMIT, "p.csv", &profile, &status));
     assert_int_equal(profile->count, IO_PROFILE_ROW_LIMIT);
     io_profile_destroy(profile);
-    memcpy(text + length, "1,2\n", 4);
-    assert_false(io_profile_parse(text, length + 4, "p.csv", &profile, &status));
+    assert_false(
+        io_profile_parse(text, header + 4 * (IO_PROFILE_ROW_LIMIT + 1), "p.csv", &profile, &status));
     assert_string_equal(status.message, "the table has more than 1000000 rows");
     assert_int_equal(status.line, IO_PROFILE_ROW_LIMIT + 2);
 
