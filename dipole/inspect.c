@@ -45,6 +45,12 @@ static bool derive_dipole(const struct inspector_result *result, const dipole_la
     return true;
 }
 
+/* Rounding may leave -0, or a tiny negative number where next to nothing passes. */
+static double part(double value)
+{
+    return value > 0 ? value : 0;
+}
+
 static bool derive_stack(const struct inspector_result *result, const dipole_layer *layers,
                          struct inspector_channel *channel, dipole_status *status)
 {
@@ -52,13 +58,12 @@ static bool derive_stack(const struct inspector_result *result, const dipole_lay
     if (!dipole_stack_create(layers, material->layer_count, material->model, result->side, &channel->stack,
                              status))
         return false;
-    /* the additions make 0 of -0 */
     const dipole_stack *const stack = channel->stack;
     channel->coefficients = *dipole_stack_coefficients(stack, 0);
-    channel->diffuse_reflectance = dipole_stack_total(stack, DIPOLE_FACE_LIT) + 0.0;
-    channel->diffuse_transmittance = dipole_stack_total(stack, DIPOLE_FACE_FAR) + 0.0;
-    channel->unscattered_reflectance = dipole_stack_unscattered(stack, DIPOLE_FACE_LIT) + 0.0;
-    channel->unscattered_transmittance = dipole_stack_unscattered(stack, DIPOLE_FACE_FAR) + 0.0;
+    channel->diffuse_reflectance = part(dipole_stack_total(stack, DIPOLE_FACE_LIT));
+    channel->diffuse_transmittance = part(dipole_stack_total(stack, DIPOLE_FACE_FAR));
+    channel->unscattered_reflectance = part(dipole_stack_unscattered(stack, DIPOLE_FACE_LIT));
+    channel->unscattered_transmittance = part(dipole_stack_unscattered(stack, DIPOLE_FACE_FAR));
     channel->r_max_mm = dipole_stack_r_max_mm(stack, DIPOLE_FACE_LIT, result->epsilon);
     channel->splat_spacing_mm = dipole_stack_splat_spacing_mm(stack, DIPOLE_FACE_LIT, result->epsilon);
     return true;

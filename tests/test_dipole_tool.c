@@ -527,6 +527,17 @@ static void plot_shows_what_matters(void **state)
     free(svg);
 }
 
+/* Height of a disc in a plot, from the top. */
+static double circle_y_px(const char *svg, int index)
+{
+    for (int i = 0; i <= index; i++) {
+        svg = strstr(svg, "<circle");
+        assert_non_null(svg);
+        svg = strstr(svg, "cy=\"") + 4;
+    }
+    return strtod(svg, NULL);
+}
+
 /* Oracle: what the picture must name: every curve with its model, face and total, and that points stand
  * where the table says. */
 static void plots_overlay_models_and_data(void **state)
@@ -536,8 +547,8 @@ static void plots_overlay_models_and_data(void **state)
     size_t size = 0;
     write_text("a.csv", "r_mm,rd_per_mm2,sem\n1,0.03,0.02\n2,0.01,1e-9\n4,-1,1\n0,1,1\n");
     write_text("b.csv", "r_lo_mm,r_hi_mm,R_per_mm2,R_sem_per_mm2\n0,1,0.2,0.001\n");
-    run_tool(&run, "dipole", "layered/marble_slab", "--model", "multipole,beam", "--plot", "p.svg", "--data",
-             "a.csv", "--data", "./b.csv", "--per-incident");
+    run_tool(&run, "dipole", "layered/marble_slab", "--model", "multipole,beam", "--plot", "p.svg",
+             "--data", "a.csv", "--data", "./b.csv", "--per-incident");
     assert_done(&run);
     assert_true(io_file_read("p.svg", 1 << 20, &svg, &size, NULL));
     static const char *const parts[] = { ">Marble, 3 mm thick: ",
@@ -557,6 +568,17 @@ static void plots_overlay_models_and_data(void **state)
     assert_int_equal(count_of(svg, "<circle"), 3);  /* two points and the legend's */
     assert_int_equal(count_of(svg, "h7.2v7.2"), 2); /* one square and the legend's */
     assert_int_equal(count_of(svg, "h8M"), 1);      /* the one bar that is long enough */
+    const double first_px = circle_y_px(svg, 0), second_px = circle_y_px(svg, 1);
+    free(svg);
+
+    /* 0.03 and 0.01 stand log(3) apart, and dividing by 0.96 lifts both */
+    run_tool(&run, "dipole", "layered/marble_slab", "--model", "multipole,beam", "--plot", "p.svg",
+             "--data", "a.csv", "--data", "./b.csv");
+    assert_done(&run);
+    assert_true(io_file_read("p.svg", 1 << 20, &svg, &size, NULL));
+    assert_null(strstr(svg, "Rsp"));
+    const double unit_px = (second_px - first_px) / log(3);
+    assert_true(fabs(circle_y_px(svg, 0) - first_px - unit_px * log(1 / 0.96)) < 0.1);
     free(svg);
 
     run_tool(&run, "dipole", "marble", "skin1", "layered/skin", "layered/marble_slab", "--plot", "p.svg");
