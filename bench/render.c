@@ -88,7 +88,8 @@ static bool run(const char *path, const struct io_scene_options *options, dipole
             false; /* a glint at a shadow's edge would outweigh what is measured */
     is_done = is_done && render_create(scene, RENDER_CONTEXT_DEFAULT, &renderer, status);
     for (int c = 0; is_done && c < IO_CHANNEL_COUNT; c++) {
-        is_done = dipole_coefficients_init(&scene->objects[0].material.medium[c], &coefficients[c], status);
+        is_done = dipole_coefficients_init(&scene->objects[0].material.layers[c][0].medium,
+                                           &coefficients[c], status);
         if (is_done && coefficients[c].alpha_prime > 0.0)
             spacing_mm = fmin(spacing_mm, dipole_splat_spacing_mm(&coefficients[c], 1e-3));
     }

@@ -51,15 +51,19 @@ static bool job_read(const struct cli_tool *tool, const struct options *options,
     if (job->scene->object_count == 0)
         return dipole_fail(status, DIPOLE_BAD_VALUE, &place, "the scene has no object to fit");
     job->material = job->scene->objects[0].material;
+    if (!io_material_check_classical(&job->material, status))
+        return false;
     if (!options->start_path)
         return true;
-    if (!io_material_read(options->start_path, &start, status))
+    if (!io_material_read(options->start_path, &start, status) ||
+        !io_material_check_classical(&start, status))
         return false;
     if (start.warning[0])
         cli_note(tool, &options->common, "%s: %s", options->start_path, start.warning);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        job->material.medium[c].sigma_a_per_mm = start.medium[c].sigma_a_per_mm;
-        job->material.medium[c].sigma_s_prime_per_mm = start.medium[c].sigma_s_prime_per_mm;
+        job->material.layers[c][0].medium.sigma_a_per_mm = start.layers[c][0].medium.sigma_a_per_mm;
+        job->material.layers[c][0].medium.sigma_s_prime_per_mm =
+            start.layers[c][0].medium.sigma_s_prime_per_mm;
     }
     return true;
 }
@@ -75,11 +79,14 @@ static bool job_fit(const struct cli_tool *tool, const struct options *options, 
     struct cli_progress progress;
     cli_progress_start(&progress, tool, &options->common);
     const double start_s = cli_now_s();
+    dipole_medium start[IO_CHANNEL_COUNT];
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        start[c] = job->material.layers[c][0].medium;
     const struct fit_picture_request request = {
         .scene = job->scene,
         .picture = job->picture,
         .picture_path = options->picture_path,
-        .start = job->material.medium,
+        .start = start,
         .progress = { .show = show_progress, .context = &progress },
     };
     const bool done = fit_picture(&request, &job->result, status);
@@ -88,8 +95,9 @@ static bool job_fit(const struct cli_tool *tool, const struct options *options, 
     if (!done)
         return false;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        job->material.medium[c].sigma_a_per_mm = job->result.channels[c].sigma_a_per_mm;
-        job->material.medium[c].sigma_s_prime_per_mm = job->result.channels[c].sigma_s_prime_per_mm;
+        job->material.layers[c][0].medium.sigma_a_per_mm = job->result.channels[c].sigma_a_per_mm;
+        job->material.layers[c][0].medium.sigma_s_prime_per_mm =
+            job->result.channels[c].sigma_s_prime_per_mm;
     }
     if (job->result.note[0])
         cli_note(tool, &options->common, "%s", job->result.note);

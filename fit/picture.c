@@ -315,7 +315,7 @@ bool fit_picture(const struct fit_picture_request *request, struct fit_picture_r
     struct fit_picture_result result = { 0 };
     struct round round = { .request = request, .errors = picture_errors(request->picture) };
     for (int c = 0; c < FIT_CHANNEL_COUNT; c++) {
-        round.media[c] = request->scene->objects[0].material.medium[c];
+        round.media[c] = request->scene->objects[0].material.layers[c][0].medium;
         round.media[c].sigma_a_per_mm = request->start[c].sigma_a_per_mm;
         round.media[c].sigma_s_prime_per_mm = request->start[c].sigma_s_prime_per_mm;
     }

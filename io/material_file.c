@@ -12,35 +12,25 @@ const char *const io_channel_names[IO_CHANNEL_COUNT] = { "R", "G", "B" };
 static const char *const fdr_names[] = {
     [DIPOLE_FDR_EXACT] = "exact", [DIPOLE_FDR_POLYNOMIAL] = "polynomial", NULL
 };
-static const char *const model_names[] = { "dipole", "multipole", "better_dipole", "beam", NULL };
+const char *const io_model_names[] = { [DIPOLE_MODEL_DIPOLE] = "dipole",
+                                       [DIPOLE_MODEL_BETTER_DIPOLE] = "better_dipole",
+                                       [DIPOLE_MODEL_MULTIPOLE] = "multipole",
+                                       [DIPOLE_MODEL_BEAM] = "beam",
+                                       NULL };
 
-/* The file as it is written: what the media follow from. */
-struct coefficients {
-    double eta;
-    double sigma_a_per_mm[IO_CHANNEL_COUNT];
-    double sigma_s_prime_per_mm[IO_CHANNEL_COUNT];
-    bool has_sigma_s;       /* sigma_s_prime is sigma_s (1 - g)                  */
-    const char *length_key; /* of the form by reflectance; NULL for the others */
-    int fdr_kind;
+static const char infinite[] = "infinite", layers_key[] = "layers";
+
+/* ---- a medium, of the whole material or of a layer ------------------------------------------------ */
+
+/* Where a medium stands and what it has from elsewhere. */
+struct medium_source {
+    const struct io_json *at;     /* the object with its coefficients                    */
+    const struct io_json *eta_at; /* the object with its eta: the same, or the material   */
+    dipole_fdr_kind fdr_kind;
+    dipole_model model;     /* that a reflectance is meant for                     */
+    bool has_sigma_s;       /* sigma_s_prime is sigma_s (1 - g)                    */
+    const char *length_key; /* of the form by reflectance; NULL for the others     */
 };
-
-/* ---- reading -------------------------------------------------------------------------------------- */
-
-/* Keys and models that the format has and this version has not: not a slip of the user's pen. */
-static bool check_supported(const struct io_json *at, dipole_status *status)
-{
-    const struct io_json layers = io_json_member(at, "layers");
-    if (layers.value)
-        return io_json_fail(&layers, DIPOLE_NOT_SUPPORTED, status,
-                            "is not supported by this version, expected one medium");
-    int model = 0;
-    if (!io_json_get_choice(at, "model", model_names, &model, status))
-        return false;
-    const struct io_json member = io_json_member(at, "model");
-    return model == 0 || io_json_fail(&member, DIPOLE_NOT_SUPPORTED, status,
-                                      "is \"%s\", which this version does not support, expected \"dipole\"",
-                                      model_names[model]);
-}
 
 static const char reflectance_key[] = "diffuse_reflectance";
 static const char *const length_keys[] = { "mean_free_path_mm", "diffuse_mean_free_path_mm" };
@@ -125,138 +115,288 @@ static bool get_g(const struct io_json *at, double g_out[IO_CHANNEL_COUNT], dipo
     return true;
 }
 
-/* sigma_a and sigma_s' of each channel from its reflectance and length. */
-static bool invert(const struct io_json *at, struct coefficients *out, dipole_status *status)
+/* The model by which a reflectance becomes a medium: in a stack, that of the half-space of each layer,
+ * which for the multipole is the dipole. */
+static bool find_inverse(const struct medium_source *source, dipole_model *model_out, dipole_status *status)
 {
-    double reflectance[IO_CHANNEL_COUNT], length_mm[IO_CHANNEL_COUNT];
-    if (!io_json_get_numbers(at, reflectance_key, IO_CHANNEL_COUNT, 0.0, 1.0, reflectance, status) ||
-        !io_json_get_numbers(at, out->length_key, IO_CHANNEL_COUNT, -INFINITY, INFINITY, length_mm, status))
-        return false;
-    const bool is_diffuse = out->length_key == length_keys[1];
-    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
-        dipole_medium medium;
-        dipole_status found;
-        if (!(is_diffuse ? dipole_medium_from_diffuse_mean_free_path : dipole_medium_from_mean_free_path)(
-                reflectance[c], length_mm[c], out->eta, (dipole_fdr_kind)out->fdr_kind, DIPOLE_MODEL_DIPOLE,
-                &medium, &found)) {
-            const char *const keys[] = { reflectance_key, out->length_key, "eta" };
-            for (size_t k = 0; k < 3; k++) {
-                const size_t length = strlen(keys[k]);
-                if (strncmp(found.message, keys[k], length) != 0 || found.message[length] != ' ')
-                    continue;
-                const struct io_json member = io_json_member(at, keys[k]),
-                                     element = io_json_element(&member, c);
-                return io_json_fail(k < 2 ? &element : &member, found.code, status, "%s",
-                                    found.message + length + 1);
-            }
-            return io_json_fail(at, found.code, status, "channel %s: %s", io_channel_names[c],
-                                found.message);
-        }
-        out->sigma_a_per_mm[c] = medium.sigma_a_per_mm;
-        out->sigma_s_prime_per_mm[c] = medium.sigma_s_prime_per_mm;
-    }
-    return true;
+    const struct io_json reflectance = io_json_member(source->at, reflectance_key);
+    *model_out = source->model == DIPOLE_MODEL_MULTIPOLE ? DIPOLE_MODEL_DIPOLE : source->model;
+    return source->model != DIPOLE_MODEL_BETTER_DIPOLE ||
+           io_json_fail(&reflectance, DIPOLE_NOT_SUPPORTED, status,
+                        "stands beside the model \"better_dipole\", which has no inverse, expected "
+                        "coefficients, or another model");
 }
 
-static bool get_coefficients(const struct io_json *at, struct coefficients *out, dipole_status *status)
+/* Say what the library found wrong at the key that it is about, its message beginning with the name of the
+ * field, which is the key's. */
+static bool fail_at_field(const struct medium_source *source, size_t channel, const dipole_status *found,
+                          dipole_status *status)
 {
-    double sigma_s_per_mm[IO_CHANNEL_COUNT], g[IO_CHANNEL_COUNT];
-    out->has_sigma_s = io_json_member(at, "sigma_s_per_mm").value != NULL;
-    if (!io_json_get_number(at, "eta", -INFINITY, INFINITY, &out->eta, status) ||
-        !io_json_get_choice(at, "fdr", fdr_names, &out->fdr_kind, status))
-        return false;
-    if (out->length_key)
-        return invert(at, out, status);
-    if (!io_json_get_numbers(at, "sigma_a_per_mm", IO_CHANNEL_COUNT, -INFINITY, INFINITY,
-                             out->sigma_a_per_mm, status))
-        return false;
-    if (!out->has_sigma_s)
-        return io_json_get_numbers(at, "sigma_s_prime_per_mm", IO_CHANNEL_COUNT, -INFINITY, INFINITY,
-                                   out->sigma_s_prime_per_mm, status);
-    if (!io_json_get_numbers(at, "sigma_s_per_mm", IO_CHANNEL_COUNT, -INFINITY, INFINITY, sigma_s_per_mm,
-                             status) ||
-        !get_g(at, g, status))
-        return false;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        out->sigma_s_prime_per_mm[c] = sigma_s_per_mm[c] * (1.0 - g[c]);
-    return true;
-}
-
-/* Say what dipole_coefficients_init found wrong, at the key that it is about: its messages begin with the
- * name of the field, which is the key's. */
-static bool fail_at_medium(const struct io_json *at, const struct coefficients *coefficients,
-                           size_t channel, const dipole_status *found, dipole_status *status)
-{
-    const char *const keys[] = { "sigma_a_per_mm", "sigma_s_prime_per_mm" };
-    for (size_t k = 0; k < 2; k++) {
+    const char *const keys[] = { "sigma_a_per_mm", "sigma_s_prime_per_mm", reflectance_key,
+                                 source->length_key ? source->length_key : reflectance_key };
+    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++) {
         const size_t length = strlen(keys[k]);
-        if (strncmp(found->message, keys[k], length) != 0)
+        if (strncmp(found->message, keys[k], length) != 0 || found->message[length] != ' ')
             continue;
-        const bool is_product = k == 1 && coefficients->has_sigma_s;
-        const struct io_json member = io_json_member(at, is_product ? "sigma_s_per_mm" : keys[k]);
+        const bool is_product = k == 1 && source->has_sigma_s;
+        const struct io_json member = io_json_member(source->at, is_product ? "sigma_s_per_mm" : keys[k]);
         const struct io_json element = io_json_element(&member, channel);
+        if (!member.value)
+            break;
         return io_json_fail(&element, found->code, status, "%s%s", is_product ? "times (1 - g): " : "",
                             found->message + (is_product ? 0 : length + 1));
     }
-    const struct io_json eta = io_json_member(at, "eta");
+    const struct io_json eta = io_json_member(source->eta_at, "eta");
     if (strncmp(found->message, "eta ", 4) == 0)
         return io_json_fail(&eta, found->code, status, "%s", found->message + 4);
-    return io_json_fail(at, found->code, status, "channel %s: %s", io_channel_names[channel],
+    return io_json_fail(source->at, found->code, status, "channel %s: %s", io_channel_names[channel],
                         found->message);
 }
 
+/* sigma_a and sigma_s' of each channel from its reflectance and length. */
+static bool invert(const struct medium_source *source, double eta, dipole_medium out[IO_CHANNEL_COUNT],
+                   dipole_status *status)
+{
+    double reflectance[IO_CHANNEL_COUNT], length_mm[IO_CHANNEL_COUNT];
+    dipole_model model;
+    if (!find_inverse(source, &model, status) ||
+        !io_json_get_numbers(source->at, reflectance_key, IO_CHANNEL_COUNT, 0.0, 1.0, reflectance,
+                             status) ||
+        !io_json_get_numbers(source->at, source->length_key, IO_CHANNEL_COUNT, -INFINITY, INFINITY,
+                             length_mm, status))
+        return false;
+    const bool is_diffuse = source->length_key == length_keys[1];
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
+        dipole_status found;
+        if (!(is_diffuse ? dipole_medium_from_diffuse_mean_free_path : dipole_medium_from_mean_free_path)(
+                reflectance[c], length_mm[c], eta, source->fdr_kind, model, &out[c], &found))
+            return fail_at_field(source, c, &found, status);
+    }
+    return true;
+}
+
+static bool get_coefficients(const struct medium_source *source, double eta,
+                             dipole_medium out[IO_CHANNEL_COUNT], dipole_status *status)
+{
+    const struct io_json *const at = source->at;
+    const char *const scattering_key = source->has_sigma_s ? "sigma_s_per_mm" : "sigma_s_prime_per_mm";
+    double sigma_a_per_mm[IO_CHANNEL_COUNT], sigma_s_per_mm[IO_CHANNEL_COUNT], g[IO_CHANNEL_COUNT] = { 0 };
+    if (!io_json_get_numbers(at, "sigma_a_per_mm", IO_CHANNEL_COUNT, -INFINITY, INFINITY, sigma_a_per_mm,
+                             status) ||
+        !io_json_get_numbers(at, scattering_key, IO_CHANNEL_COUNT, -INFINITY, INFINITY, sigma_s_per_mm,
+                             status) ||
+        (source->has_sigma_s && !get_g(at, g, status)))
+        return false;
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++)
+        out[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a_per_mm[c],
+                                  .sigma_s_prime_per_mm = sigma_s_per_mm[c] * (1.0 - g[c]),
+                                  .eta = eta,
+                                  .fdr_kind = source->fdr_kind };
+    return true;
+}
+
 /* Legal, but so far from any material that a unit slip is likelier. */
-static void warn_of_units(const dipole_coefficients *coefficients, size_t channel, char *out, size_t size)
+static void warn_of_units(const struct io_json *at, const dipole_coefficients *coefficients, size_t channel,
+                          char *out, size_t size)
 {
     const double mean_free_path_mm = coefficients->mean_free_path_mm;
     if (out[0] || (mean_free_path_mm >= 1e-4 && mean_free_path_mm <= 1e4))
         return;
-    snprintf(
-        out, size,
-        "channel %s: sigma_a_per_mm + sigma_s_prime_per_mm is %.6g, a mean free path of %.6g mm, expected "
-        "0.0001 to 10000 mm; %s",
-        io_channel_names[channel], coefficients->sigma_t_prime_per_mm, mean_free_path_mm,
-        mean_free_path_mm < 1.0
-            ? "coefficients in 1/m must be divided by 1000 to be in 1/mm, those in 1/cm by 10"
-            : "coefficients in 1/um must be multiplied by 1000 to be in 1/mm");
+    char layer[32] = "";
+    if (at->parent && at->parent->key && strcmp(at->parent->key, layers_key) == 0)
+        snprintf(layer, sizeof layer, "layers[%zu], ", at->index);
+    snprintf(out, size,
+             "%schannel %s: sigma_a_per_mm + sigma_s_prime_per_mm is %.6g, a mean free path of %.6g mm, "
+             "expected "
+             "0.0001 to 10000 mm; %s",
+             layer, io_channel_names[channel], coefficients->sigma_t_prime_per_mm, mean_free_path_mm,
+             mean_free_path_mm < 1.0
+                 ? "coefficients in 1/m must be divided by 1000 to be in 1/mm, those in 1/cm by 10"
+                 : "coefficients in 1/um must be multiplied by 1000 to be in 1/mm");
+}
+
+/* The medium that stands at source->at, in all channels; length_key and has_sigma_s are found here. */
+static bool read_medium(struct medium_source *source, dipole_medium out[IO_CHANNEL_COUNT], char *warning,
+                        size_t warning_size, dipole_status *status)
+{
+    double eta = 0.0;
+    if (!check_form(source->at, &source->length_key, status) ||
+        !io_json_get_number(source->eta_at, "eta", -INFINITY, INFINITY, &eta, status))
+        return false;
+    source->has_sigma_s = io_json_member(source->at, "sigma_s_per_mm").value != NULL;
+    if (!(source->length_key ? invert : get_coefficients)(source, eta, out, status))
+        return false;
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
+        dipole_coefficients derived;
+        dipole_status found;
+        if (!dipole_coefficients_init(&out[c], &derived, &found))
+            return fail_at_field(source, c, &found, status);
+        warn_of_units(source->at, &derived, c, warning, warning_size);
+    }
+    return true;
+}
+
+/* ---- the material --------------------------------------------------------------------------------- */
+
+#define MEDIUM_KEYS                                                                                        \
+    "sigma_a_per_mm", "sigma_s_prime_per_mm", "sigma_s_per_mm", "g", reflectance_key, length_keys[0],      \
+        length_keys[1]
+
+/* Millimetres, or "infinite" in the last layer. Numbers are checked with the stack. */
+static bool get_thickness(const struct io_json *layer, bool is_last, double *out, dipole_status *status)
+{
+    const struct io_json member = io_json_member(layer, "thickness_mm");
+    const char *const text = json_string_value(member.value);
+    if (!text)
+        return io_json_get_number(layer, "thickness_mm", -INFINITY, INFINITY, out, status);
+    if (strcmp(text, infinite) != 0)
+        return io_json_fail(&member, DIPOLE_BAD_VALUE, status, "is \"%.60s\", expected a number of mm%s",
+                            text, is_last ? ", or \"infinite\"" : "");
+    *out = INFINITY;
+    return is_last || io_json_fail(&member, DIPOLE_BAD_VALUE, status,
+                                   "is \"infinite\", expected a number of mm: only the last layer can be");
+}
+
+static bool read_layer(const struct io_json *material_at, const struct io_json *at, size_t index,
+                       dipole_fdr_kind fdr_kind, struct io_material *material, dipole_status *status)
+{
+    const char *const known[] = { "thickness_mm", "name", "eta", MEDIUM_KEYS, NULL };
+    const struct io_json eta = io_json_member(at, "eta");
+    struct medium_source source = {
+        .at = at, .eta_at = eta.value ? at : material_at, .fdr_kind = fdr_kind, .model = material->model
+    };
+    dipole_medium media[IO_CHANNEL_COUNT];
+    double thickness_mm = 0.0;
+    if (!io_json_check_object(at, known, 1, status) ||
+        !io_json_get_text(at, "name", material->layer_names[index], sizeof material->layer_names[index],
+                          status) ||
+        !get_thickness(at, index + 1 == material->layer_count, &thickness_mm, status))
+        return false;
+    if (!io_json_member(source.eta_at, "eta").value)
+        return io_json_fail(&eta, DIPOLE_BAD_VALUE, status,
+                            "is missing, expected it here, or beside layers for all of them");
+    if (!read_medium(&source, media, material->warning, sizeof material->warning, status))
+        return false;
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++)
+        material->layers[c][index] = (dipole_layer){ .medium = media[c], .thickness_mm = thickness_mm };
+    return true;
+}
+
+/* Say what dipole_stack_create found wrong, its message beginning with "layers[i].key" or "layers[i]". */
+static bool fail_at_stack(const struct io_json *at, size_t channel, const dipole_status *found,
+                          dipole_status *status)
+{
+    size_t index;
+    int length = 0;
+    if (sscanf(found->message, "layers[%zu]%n", &index, &length) != 1 || length == 0)
+        return io_json_fail(at, found->code, status, "channel %s: %s", io_channel_names[channel],
+                            found->message);
+    const char *const keys[] = { ".eta ", ".thickness_mm ", " " };
+    const char *rest = found->message + length;
+    size_t k = 0;
+    while (k + 1 < sizeof keys / sizeof keys[0] && strncmp(rest, keys[k], strlen(keys[k])) != 0)
+        k++;
+    const struct io_json layers = io_json_member(at, layers_key);
+    const struct io_json layer = io_json_element(&layers, index);
+    const struct io_json member = io_json_member(&layer, k == 0 ? "eta" : "thickness_mm");
+    rest += strncmp(rest, keys[k], strlen(keys[k])) == 0 ? strlen(keys[k]) : 0;
+    return k < 2 ? io_json_fail(&member, found->code, status, "%s", rest)
+                 : io_json_fail(&member, found->code, status, "(channel %s) %s", io_channel_names[channel],
+                                rest);
+}
+
+static bool check_stacks(const struct io_json *at, const struct io_material *material,
+                         dipole_status *status)
+{
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
+        dipole_stack *stack = NULL;
+        dipole_status found;
+        if (!dipole_stack_create(material->layers[c], material->layer_count, material->model,
+                                 DIPOLE_FROM_ABOVE, &stack, &found))
+            return fail_at_stack(at, c, &found, status);
+        dipole_stack_destroy(stack);
+    }
+    return true;
+}
+
+static bool read_layers(const struct io_json *at, dipole_fdr_kind fdr_kind, struct io_material *material,
+                        dipole_status *status)
+{
+    const char *const medium_keys[] = { MEDIUM_KEYS };
+    const struct io_json layers = io_json_member(at, layers_key), model = io_json_member(at, "model");
+    for (size_t i = 0; i < sizeof medium_keys / sizeof medium_keys[0]; i++) {
+        const struct io_json member = io_json_member(at, medium_keys[i]);
+        if (member.value)
+            return io_json_fail(&member, DIPOLE_BAD_VALUE, status,
+                                "stands beside layers, expected either layers or one medium");
+    }
+    if (material->model != DIPOLE_MODEL_BEAM && material->model != DIPOLE_MODEL_MULTIPOLE)
+        return io_json_fail(&model, DIPOLE_NOT_SUPPORTED, status,
+                            "is \"%s\", which knows only a half-space, expected \"beam\" or "
+                            "\"multipole\" beside layers",
+                            io_model_names[material->model]);
+    if (!io_json_check_array(&layers, 1, DIPOLE_LAYER_LIMIT, &material->layer_count, status))
+        return false;
+    for (size_t i = 0; i < material->layer_count; i++) {
+        const struct io_json layer = io_json_element(&layers, i);
+        if (!read_layer(at, &layer, i, fdr_kind, material, status))
+            return false;
+    }
+    return check_stacks(at, material, status);
+}
+
+static bool read_homogeneous(const struct io_json *at, dipole_fdr_kind fdr_kind,
+                             struct io_material *material, dipole_status *status)
+{
+    const struct io_json eta = io_json_member(at, "eta");
+    struct medium_source source = {
+        .at = at, .eta_at = at, .fdr_kind = fdr_kind, .model = material->model
+    };
+    dipole_medium media[IO_CHANNEL_COUNT];
+    if (!eta.value)
+        return io_json_fail(&eta, DIPOLE_BAD_VALUE, status, "is missing, it is required here");
+    if (!read_medium(&source, media, material->warning, sizeof material->warning, status))
+        return false;
+    io_material_set_media(material, media);
+    return check_stacks(at, material, status);
+}
+
+/* What io_material_check_classical will say. */
+static void refusal_init(const struct io_json *at, struct io_material *material)
+{
+    const struct io_json layers = io_json_member(at, layers_key), model = io_json_member(at, "model");
+    if (layers.value)
+        io_json_fail(&layers, DIPOLE_NOT_SUPPORTED, &material->refusal,
+                     "cannot be done by this program, which knows the classical dipole only, expected one "
+                     "medium with the model \"dipole\"");
+    else if (material->model != DIPOLE_MODEL_DIPOLE)
+        io_json_fail(&model, DIPOLE_NOT_SUPPORTED, &material->refusal,
+                     "is \"%s\", which cannot be done by this program, expected \"dipole\"",
+                     io_model_names[material->model]);
 }
 
 bool io_material_parse(const struct io_json *at, struct io_material *out, dipole_status *status)
 {
-    const char *const known[] = { "name",
-                                  "eta",
-                                  "model",
-                                  "fdr",
-                                  "sigma_a_per_mm",
-                                  "sigma_s_prime_per_mm",
-                                  "sigma_s_per_mm",
-                                  "g",
-                                  reflectance_key,
-                                  length_keys[0],
-                                  length_keys[1],
-                                  "source",
-                                  "extras",
-                                  "fit",
-                                  NULL };
-    struct coefficients coefficients = { .fdr_kind = DIPOLE_FDR_EXACT };
+    const char *const known[] = { "name",     "eta",    "model",  "fdr", MEDIUM_KEYS,
+                                  layers_key, "source", "extras", "fit", NULL };
+    const bool has_layers = json_object_get(at->value, layers_key) != NULL;
     struct io_material material = { 0 };
-    if ((json_is_object(at->value) && !check_supported(at, status)) ||
-        !io_json_check_object(at, known, 2, status) || !check_form(at, &coefficients.length_key, status) ||
+    int model = has_layers ? DIPOLE_MODEL_BEAM : DIPOLE_MODEL_DIPOLE, fdr_kind = DIPOLE_FDR_EXACT;
+    const struct io_json thickness = io_json_member(at, "thickness_mm");
+    if (thickness.value)
+        return io_json_fail(&thickness, DIPOLE_BAD_VALUE, status,
+                            "stands beside the material's name, expected in one of its layers, as in "
+                            "\"layers\": [{ \"thickness_mm\": 3, ... }]");
+    if (!io_json_check_object(at, known, 1, status) ||
         !io_json_get_text(at, "name", material.name, sizeof material.name, status) ||
         !io_json_get_text(at, "source", material.source, sizeof material.source, status) ||
-        !get_coefficients(at, &coefficients, status))
+        !io_json_get_choice(at, "model", io_model_names, &model, status) ||
+        !io_json_get_choice(at, "fdr", fdr_names, &fdr_kind, status))
         return false;
-    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
-        material.medium[c] = (dipole_medium){ .sigma_a_per_mm = coefficients.sigma_a_per_mm[c],
-                                              .sigma_s_prime_per_mm = coefficients.sigma_s_prime_per_mm[c],
-                                              .eta = coefficients.eta,
-                                              .fdr_kind = (dipole_fdr_kind)coefficients.fdr_kind };
-        dipole_coefficients derived;
-        dipole_status found;
-        if (!dipole_coefficients_init(&material.medium[c], &derived, &found))
-            return fail_at_medium(at, &coefficients, c, &found, status);
-        warn_of_units(&derived, c, material.warning, sizeof material.warning);
-    }
+    material.model = (dipole_model)model;
+    if (!(has_layers ? read_layers : read_homogeneous)(at, (dipole_fdr_kind)fdr_kind, &material, status))
+        return false;
+    refusal_init(at, &material);
     *out = material;
     return true;
 }
@@ -270,6 +410,35 @@ bool io_material_read(const char *path, struct io_material *out, dipole_status *
     const bool done = io_material_parse(&root, out, status);
     io_json_destroy(document);
     return done;
+}
+
+/* ---- what a material is --------------------------------------------------------------------------- */
+
+bool io_material_has_layers(const struct io_material *material)
+{
+    return material->layer_count != 1 || isfinite(material->layers[0][0].thickness_mm);
+}
+
+void io_material_set_media(struct io_material *material, const dipole_medium media[IO_CHANNEL_COUNT])
+{
+    material->layer_count = 1;
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++)
+        material->layers[c][0] = (dipole_layer){ .medium = media[c], .thickness_mm = INFINITY };
+}
+
+bool io_material_check_classical(const struct io_material *material, dipole_status *status)
+{
+    if (material->refusal.code == DIPOLE_OK && material->model == DIPOLE_MODEL_DIPOLE &&
+        !io_material_has_layers(material))
+        return true;
+    if (material->refusal.code == DIPOLE_OK)
+        return dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL,
+                           "material \"%.100s\" has layers or another model, expected one medium with the "
+                           "model \"dipole\"",
+                           material->name);
+    if (status)
+        *status = material->refusal;
+    return false;
 }
 
 /* ---- bundled materials ---------------------------------------------------------------------------- */
@@ -308,21 +477,76 @@ bool io_material_open(const char *name, struct io_material *out, dipole_status *
 
 /* ---- writing -------------------------------------------------------------------------------------- */
 
+static json_t *numbers_of(const struct io_material *material, size_t layer, bool is_absorption)
+{
+    double values[IO_CHANNEL_COUNT];
+    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const dipole_medium *const medium = &material->layers[c][layer].medium;
+        values[c] = is_absorption ? medium->sigma_a_per_mm : medium->sigma_s_prime_per_mm;
+    }
+    return json_pack("[fff]", values[0], values[1], values[2]);
+}
+
+static bool has_one_eta(const struct io_material *material)
+{
+    for (size_t i = 1; i < material->layer_count; i++)
+        if (material->layers[0][i].medium.eta != material->layers[0][0].medium.eta)
+            return false;
+    return true;
+}
+
+static json_t *layers_of(const struct io_material *material)
+{
+    json_t *const layers = json_array();
+    for (size_t i = 0; layers && i < material->layer_count; i++) {
+        const dipole_layer *const layer = &material->layers[0][i];
+        const char *const name = material->layer_names[i];
+        json_t *const thickness =
+            isinf(layer->thickness_mm) ? json_string(infinite) : json_real(layer->thickness_mm);
+        json_t *const eta = has_one_eta(material) ? NULL : json_real(layer->medium.eta);
+        json_t *const json =
+            json_pack("{s:s*, s:o, s:o*, s:o, s:o}", "name", name[0] ? name : NULL, "thickness_mm",
+                      thickness, "eta", eta, "sigma_a_per_mm", numbers_of(material, i, true),
+                      "sigma_s_prime_per_mm", numbers_of(material, i, false));
+        if (json_array_append_new(layers, json) != 0) {
+            json_decref(layers);
+            return NULL;
+        }
+    }
+    return layers;
+}
+
+/* Add a member whose value may be NULL because it could not be made. */
+static bool add(json_t *object, const char *key, json_t *value)
+{
+    return json_object_set_new(object, key, value) == 0;
+}
+
+static json_t *material_to_json(const struct io_material *material, const json_t *fit)
+{
+    const bool has_layers = io_material_has_layers(material);
+    const dipole_medium *const medium = &material->layers[0][0].medium;
+    json_t *const json = json_pack("{s:s, s:s*}", "name", material->name, "source",
+                                   material->source[0] ? material->source : NULL);
+    const bool done =
+        json && (!has_one_eta(material) || add(json, "eta", json_real(medium->eta))) &&
+        add(json, "model", json_string(io_model_names[material->model])) &&
+        add(json, "fdr", json_string(fdr_names[medium->fdr_kind])) &&
+        (has_layers ? add(json, layers_key, layers_of(material))
+                    : add(json, "sigma_a_per_mm", numbers_of(material, 0, true)) &&
+                          add(json, "sigma_s_prime_per_mm", numbers_of(material, 0, false))) &&
+        (!fit || add(json, "fit", json_deep_copy(fit)));
+    if (done)
+        return json;
+    json_decref(json);
+    return NULL;
+}
+
 bool io_material_write(const char *path, const struct io_material *material, const json_t *fit,
                        dipole_status *status)
 {
-    const dipole_medium *medium = material->medium;
-    json_t *json = json_pack(
-        "{s:s, s:s*, s:f, s:s, s:s, s:[fff], s:[fff]}", "name", material->name, "source",
-        material->source[0] ? material->source : NULL, "eta", medium[0].eta, "model", model_names[0], "fdr",
-        fdr_names[medium[0].fdr_kind], "sigma_a_per_mm", medium[0].sigma_a_per_mm, medium[1].sigma_a_per_mm,
-        medium[2].sigma_a_per_mm, "sigma_s_prime_per_mm", medium[0].sigma_s_prime_per_mm,
-        medium[1].sigma_s_prime_per_mm, medium[2].sigma_s_prime_per_mm);
-    if (json && fit && json_object_set_new(json, "fit", json_deep_copy(fit)) != 0) {
-        json_decref(json);
-        json = NULL;
-    }
-    char *text = json ? io_json_format(json) : NULL;
+    json_t *const json = material_to_json(material, fit);
+    char *const text = json ? io_json_format(json) : NULL;
     json_decref(json);
     const dipole_place place = { .source = path };
     const bool done =

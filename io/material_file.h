@@ -10,12 +10,31 @@ enum { IO_CHANNEL_COUNT = 3 };
 /* Names of the channels: "R", "G", "B". */
 extern const char *const io_channel_names[IO_CHANNEL_COUNT];
 
+/* Names of the models in files, by dipole_model; ends with NULL. */
+extern const char *const io_model_names[];
+
+/* A homogeneous material is one layer of infinite thickness. Layers are top first, as many in each channel.
+ */
 struct io_material {
     char name[128];
-    char source[512];                       /* publication, or ""                        */
-    char warning[384];                      /* suspicious but legal (a unit slip), or "" */
-    dipole_medium medium[IO_CHANNEL_COUNT]; /* checked by dipole_coefficients_init       */
+    char source[512];  /* publication, or ""                        */
+    char warning[384]; /* suspicious but legal (a unit slip), or "" */
+    dipole_model model;
+    size_t layer_count;
+    dipole_layer layers[IO_CHANNEL_COUNT][DIPOLE_LAYER_LIMIT]; /* checked by dipole_stack_create    */
+    char layer_names[DIPOLE_LAYER_LIMIT][64];                  /* "epidermis", or ""                */
+    dipole_status refusal; /* of io_material_check_classical, when a file asks for more; else DIPOLE_OK */
 };
+
+/* More than one layer, or one that ends. */
+bool io_material_has_layers(const struct io_material *material);
+
+/* Make it a half-space of these media, one for each channel. */
+void io_material_set_media(struct io_material *material, const dipole_medium media[IO_CHANNEL_COUNT]);
+
+/* Fail unless the material is one homogeneous medium with the model "dipole": for programs that know no
+ * other. The message names file, place and key. */
+DIPOLE_CHECKED bool io_material_check_classical(const struct io_material *material, dipole_status *status);
 
 /* Read and check a material file. Fails with place (line, column where JSON has them) and the key. */
 DIPOLE_CHECKED bool io_material_read(const char *path, struct io_material *out, dipole_status *status);

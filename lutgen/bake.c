@@ -34,9 +34,11 @@ struct channel {
 static bool channels_init(const struct io_material *material, double epsilon,
                           struct channel channels[IO_CHANNEL_COUNT], dipole_status *status)
 {
+    if (!io_material_check_classical(material, status))
+        return false;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         struct channel *const channel = &channels[c];
-        if (!dipole_coefficients_init(&material->medium[c], &channel->coefficients, status))
+        if (!dipole_coefficients_init(&material->layers[c][0].medium, &channel->coefficients, status))
             return false;
         channel->has_scattering = channel->coefficients.alpha_prime > 0;
         channel->r_max_mm = dipole_r_max_mm(&channel->coefficients, epsilon);

@@ -60,7 +60,8 @@ static bool jobs_read(const struct cli_tool *tool, const struct options *options
                     status, DIPOLE_BAD_VALUE, NULL,
                     "%.100s and %.100s would both become %.100s, expected different file names",
                     jobs[j].material_path, job->material_path, job->path);
-        if (!io_material_open(job->material_path, &job->material, status))
+        if (!io_material_open(job->material_path, &job->material, status) ||
+            !io_material_check_classical(&job->material, status))
             return false;
         if (job->material.warning[0])
             cli_note(tool, &options->common, "%s: %s", job->material_path, job->material.warning);

@@ -55,7 +55,7 @@ static void input_hash(const struct lut_splat1d *lut, const char *version, bool 
     hash_text(&hash, "dipole");
     hash_text(&hash, lut->material.name);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        const dipole_medium *const medium = &lut->material.medium[c];
+        const dipole_medium *const medium = &lut->material.layers[c][0].medium;
         hash_number(&hash, medium->sigma_a_per_mm);
         hash_number(&hash, medium->sigma_s_prime_per_mm);
         hash_number(&hash, medium->eta);
@@ -77,12 +77,14 @@ static void scales_find(const struct lut_splat1d *lut, bool is_half, double scal
 static bool attributes_set(struct io_image *image, const struct lut_splat1d *lut, bool is_half,
                            const double scale[IO_CHANNEL_COUNT])
 {
-    const dipole_medium *const medium = lut->material.medium;
+    const dipole_layer(*const layers)[DIPOLE_LAYER_LIMIT] = lut->material.layers;
+    const dipole_medium *const first = &layers[0][0].medium;
     double sigma_a[IO_CHANNEL_COUNT], sigma_s_prime[IO_CHANNEL_COUNT];
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        assert(medium[c].eta == medium[0].eta && medium[c].fdr_kind == medium[0].fdr_kind);
-        sigma_a[c] = medium[c].sigma_a_per_mm;
-        sigma_s_prime[c] = medium[c].sigma_s_prime_per_mm;
+        const dipole_medium *const medium = &layers[c][0].medium;
+        assert(medium->eta == first->eta && medium->fdr_kind == first->fdr_kind);
+        sigma_a[c] = medium->sigma_a_per_mm;
+        sigma_s_prime[c] = medium->sigma_s_prime_per_mm;
     }
     char hash[17];
     input_hash(lut, dipole_version(), is_half, hash);
@@ -91,8 +93,8 @@ static bool attributes_set(struct io_image *image, const struct lut_splat1d *lut
            io_image_set_text(image, "dipole:material", lut->material.name) &&
            io_image_set_numbers(image, "dipole:sigma_a_per_mm", sigma_a) &&
            io_image_set_numbers(image, "dipole:sigma_s_prime_per_mm", sigma_s_prime) &&
-           io_image_set_number(image, "dipole:eta", medium[0].eta) &&
-           io_image_set_text(image, "dipole:fdr", fdr_names[medium[0].fdr_kind]) &&
+           io_image_set_number(image, "dipole:eta", first->eta) &&
+           io_image_set_text(image, "dipole:fdr", fdr_names[first->fdr_kind]) &&
            io_image_set_text(image, "dipole:model", "dipole") &&
            io_image_set_number(image, "dipole:epsilon", lut->epsilon) &&
            io_image_set_text(image, "dipole:axis_mapping", axis_mapping) &&
@@ -212,17 +214,19 @@ static bool material_get(const struct reader *reader, struct io_material *out)
         !get_text(reader, "dipole:model", (const char *const[]){ "dipole" }, 1, &model))
         return false;
     snprintf(out->name, sizeof out->name, "%.*s", (int)sizeof out->name - 1, name->text);
+    dipole_medium media[IO_CHANNEL_COUNT];
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        out->medium[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a[c],
-                                          .sigma_s_prime_per_mm = sigma_s_prime[c],
-                                          .eta = eta,
-                                          .fdr_kind = (dipole_fdr_kind)fdr };
+        media[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a[c],
+                                    .sigma_s_prime_per_mm = sigma_s_prime[c],
+                                    .eta = eta,
+                                    .fdr_kind = (dipole_fdr_kind)fdr };
         dipole_coefficients unused;
         dipole_status why = { 0 };
-        if (!dipole_coefficients_init(&out->medium[c], &unused, &why))
+        if (!dipole_coefficients_init(&media[c], &unused, &why))
             return dipole_fail(reader->status, why.code, &reader->place, "channel %s: %s",
                                io_channel_names[c], why.message);
     }
+    io_material_set_media(out, media);
     return true;
 }
 

@@ -236,8 +236,13 @@ static void layout_init(const struct plot *plot, struct plot_layout *layout)
 
     layout->row_count = 0;
     for (size_t i = 0; i < plot->series_count; i++)
-        if (plot->series[i].label)
-            row_init_series(plot, layout, i, &layout->rows[layout->row_count++]);
+        if (plot->series[i].label) {
+            struct plot_row *const row = &layout->rows[layout->row_count++];
+            if (plot->has_legend)
+                *row = (struct plot_row){ .index = i, .wanted_px = layout->top + 12 };
+            else
+                row_init_series(plot, layout, i, row);
+        }
     for (size_t i = 0; i < plot->marker_count; i++) {
         const struct plot_marker *const marker = &plot->markers[i];
         const double position = plot_range_position(&layout->y, marker->value);

@@ -7,6 +7,7 @@
 enum plot_scale { PLOT_LINEAR = 0, PLOT_LOG };
 enum plot_dash { PLOT_SOLID = 0, PLOT_DASHED, PLOT_DASH_DOTTED, PLOT_DOTTED };
 enum plot_kind { PLOT_LINE = 0, PLOT_POINTS, PLOT_BAND };
+enum plot_mark { PLOT_DISC = 0, PLOT_SQUARE, PLOT_DIAMOND, PLOT_TRIANGLE };
 
 /* Tones for red, green and blue channels that colour-blind readers can tell apart on white; use a
  * different dash for each as well. */
@@ -29,7 +30,10 @@ struct plot_series {
     const double *x, *y;          /* y is not read for a band                           */
     const double *y_low, *y_high; /* edges of a band; ends of error bars, NULL for none */
     const char *color;            /* "#rrggbb"; NULL for the next one of the palette    */
-    enum plot_dash dash;
+    enum plot_dash dash;          /* of a line */
+    bool is_thin;                 /* a line of half the width */
+    enum plot_mark mark;          /* of points */
+    bool is_hollow;               /* points that let the lines below be seen */
 };
 
 /* A straight line across the frame, its label outside. */
@@ -50,6 +54,7 @@ struct plot {
     size_t series_count;
     const struct plot_marker *markers;
     size_t marker_count;
+    bool has_legend; /* labels stand together, in the order of the series, not each beside its line */
 };
 
 /*

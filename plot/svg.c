@@ -103,14 +103,19 @@ static void axis_draw(struct plot_text *out, const struct plot *plot, const stru
     }
 }
 
+static const char *line_width(const struct plot_series *series)
+{
+    return series->is_thin ? "1.2" : "2.4";
+}
+
 /* One stroke per run of drawable points; a lone point becomes a dot. */
 static void line_draw(struct plot_text *out, const struct plot_layout *layout,
                       const struct plot_series *series, const char *color)
 {
     plot_text_print(out,
-                    "<path fill=\"none\" stroke=\"%s\" stroke-width=\"2.4\" stroke-linejoin=\"round\" "
+                    "<path fill=\"none\" stroke=\"%s\" stroke-width=\"%s\" stroke-linejoin=\"round\" "
                     "stroke-dasharray=\"%s\" d=\"",
-                    color, dash_pattern(series->dash));
+                    color, line_width(series), dash_pattern(series->dash));
     bool is_down = false, is_lone = false;
     for (size_t i = 0; i <= series->count; i++) {
         const double x_px = i < series->count ? plot_layout_x_px(layout, series->x[i]) : NAN;
@@ -154,12 +159,42 @@ static void band_draw(struct plot_text *out, const struct plot_layout *layout,
     }
 }
 
-static void point_draw(struct plot_text *out, double x_px, double y_px, const char *color)
+static void point_draw(struct plot_text *out, double x_px, double y_px, const struct plot_series *series,
+                       const char *color)
 {
+    static const char *const outlines[] = { [PLOT_SQUARE] = "m-3.6 -3.6h7.2v7.2h-7.2z",
+                                            [PLOT_DIAMOND] = "m0 -5l5 5l-5 5l-5 -5z",
+                                            [PLOT_TRIANGLE] = "m0 -5l4.8 8.4h-9.6z" };
+    const char *const fill = series->is_hollow ? "none" : color;
+    const char *const stroke = series->is_hollow ? color : "white";
+    if (series->mark == PLOT_DISC)
+        plot_text_print(out,
+                        "<circle cx=\"%f\" cy=\"%f\" r=\"4\" fill=\"%s\" stroke=\"%s\" "
+                        "stroke-width=\"1.2\"/>\n",
+                        x_px, y_px, fill, stroke);
+    else
+        plot_text_print(out, "<path fill=\"%s\" stroke=\"%s\" stroke-width=\"1.2\" d=\"M%f %f%s\"/>\n",
+                        fill, stroke, x_px, y_px, outlines[series->mark]);
+}
+
+/* From one end of an interval to the other. A hollow point's bar is left out where it would lie within. */
+static void bar_draw(struct plot_text *out, const struct plot_layout *layout,
+                     const struct plot_series *series, size_t i, const char *color)
+{
+    const double x_px = plot_layout_x_px(layout, series->x[i]),
+                 y_px = plot_layout_y_px(layout, series->y[i]);
+    double low_px = plot_layout_y_px(layout, series->y_low[i]),
+           high_px = plot_layout_y_px(layout, series->y_high[i]);
+    if (isnan(low_px)) /* an interval that reaches 0 on a logarithmic axis */
+        low_px = layout->bottom + 20;
+    if (isnan(high_px))
+        high_px = y_px;
+    if (series->is_hollow && low_px - y_px < 6 && y_px - high_px < 6)
+        return;
     plot_text_print(out,
-                    "<circle cx=\"%f\" cy=\"%f\" r=\"4\" fill=\"%s\" stroke=\"white\" "
-                    "stroke-width=\"1.2\"/>\n",
-                    x_px, y_px, color);
+                    "<path stroke=\"%s\" stroke-width=\"1.4\" fill=\"none\" "
+                    "d=\"M%f %fV%fM%f %fh8M%f %fh8\"/>\n",
+                    color, x_px, low_px, high_px, x_px - 4, low_px, x_px - 4, high_px);
 }
 
 static void points_draw(struct plot_text *out, const struct plot_layout *layout,
@@ -170,19 +205,9 @@ static void points_draw(struct plot_text *out, const struct plot_layout *layout,
                      y_px = plot_layout_y_px(layout, series->y[i]);
         if (isnan(x_px) || isnan(y_px))
             continue;
-        if (series->y_low && series->y_high) {
-            double low_px = plot_layout_y_px(layout, series->y_low[i]),
-                   high_px = plot_layout_y_px(layout, series->y_high[i]);
-            if (isnan(low_px)) /* an interval that reaches 0 on a logarithmic axis */
-                low_px = layout->bottom + 20;
-            if (isnan(high_px))
-                high_px = y_px;
-            plot_text_print(out,
-                            "<path stroke=\"%s\" stroke-width=\"1.4\" fill=\"none\" "
-                            "d=\"M%f %fV%fM%f %fh8M%f %fh8\"/>\n",
-                            color, x_px, low_px, high_px, x_px - 4, low_px, x_px - 4, high_px);
-        }
-        point_draw(out, x_px, y_px, color);
+        if (series->y_low && series->y_high)
+            bar_draw(out, layout, series, i, color);
+        point_draw(out, x_px, y_px, series, color);
     }
 }
 
@@ -242,13 +267,13 @@ static void swatch_draw(struct plot_text *out, const struct plot_series *series,
                         x_px, y_px - 5, PLOT_SWATCH_PX, PLOT_SWATCH_PX);
         break;
     case PLOT_POINTS:
-        point_draw(out, x_px + PLOT_SWATCH_PX / 2.0, y_px, color);
+        point_draw(out, x_px + PLOT_SWATCH_PX / 2.0, y_px, series, color);
         break;
     case PLOT_LINE:
         plot_text_print(out,
-                        "<path fill=\"none\" stroke=\"%s\" stroke-width=\"2.4\" stroke-dasharray=\"%s\" "
+                        "<path fill=\"none\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\" "
                         "d=\"M%f %fh%d\"/>\n",
-                        color, dash_pattern(series->dash), x_px, y_px, PLOT_SWATCH_PX);
+                        color, line_width(series), dash_pattern(series->dash), x_px, y_px, PLOT_SWATCH_PX);
     }
 }
 

@@ -1,6 +1,7 @@
 /* render: draw a scene of translucent objects. */
 #include "cli/cli.h"
 #include "renderer/output.h"
+#include "renderer/plan.h"
 #include "renderer/tables.h"
 #include "renderer/view.h"
 
@@ -113,7 +114,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     bool is_png;
     const bool done =
         (!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
-        io_scene_read(scene_path, &reading, &scene, status) &&
+        io_scene_read(scene_path, &reading, &scene, status) && render_plan_check_media(scene, status) &&
         (!options->table_folder ||
          render_table_find(options->table_folder, &scene->objects[0].material, &table, status)) &&
         render_create(scene, kind, &renderer, status) &&

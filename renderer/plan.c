@@ -121,7 +121,7 @@ static const char *media_difference(const struct io_material *a, const struct io
                                     double *a_out, double *b_out)
 {
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        const dipole_medium *const x = &a->medium[c], *const y = &b->medium[c];
+        const dipole_medium *const x = &a->layers[c][0].medium, *const y = &b->layers[c][0].medium;
         const struct {
             const char *name;
             double x, y;
@@ -149,6 +149,8 @@ bool render_plan_check_media(const struct io_scene *scene, dipole_status *status
     const struct io_object *const first = &scene->objects[0];
     for (size_t i = 0; i < scene->object_count; i++) {
         const struct io_object *const other = &scene->objects[i];
+        if (!io_material_check_classical(&other->material, status))
+            return false;
         int channel;
         double a, b;
         const char *const name = media_difference(&first->material, &other->material, &channel, &a, &b);
@@ -157,11 +159,12 @@ bool render_plan_check_media(const struct io_scene *scene, dipole_status *status
                                "objects \"%s\" and \"%s\" are of different media (%s in %s: %g and %g), "
                                "expected one material in the whole scene",
                                first->name, other->name, name, io_channel_names[channel], a, b);
-        const dipole_medium *const medium = other->material.medium;
-        if (medium[1].eta != medium[0].eta || medium[2].eta != medium[0].eta)
+        const dipole_layer(*const layers)[DIPOLE_LAYER_LIMIT] = other->material.layers;
+        const double eta[] = { layers[0][0].medium.eta, layers[1][0].medium.eta, layers[2][0].medium.eta };
+        if (eta[1] != eta[0] || eta[2] != eta[0])
             return dipole_fail(status, DIPOLE_BAD_VALUE, &place,
                                "object \"%s\" has an eta per channel (%g, %g, %g), expected one",
-                               other->name, medium[0].eta, medium[1].eta, medium[2].eta);
+                               other->name, eta[0], eta[1], eta[2]);
     }
     return true;
 }
@@ -208,12 +211,12 @@ static bool read_scene(const struct render_request *request, struct render_plan 
         (request->table && !render_plan_check_table(request->table, material, NULL, status)))
         return false;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        if (!dipole_coefficients_init(&material->medium[c], &plan->coefficients[c], status))
+        if (!dipole_coefficients_init(&material->layers[c][0].medium, &plan->coefficients[c], status))
             return false;
         plan->diffuse_reflectance[c] = dipole_diffuse_reflectance(&plan->coefficients[c]);
         plan->has_scattering |= plan->coefficients[c].alpha_prime > 0;
     }
-    plan->eta = material->medium[0].eta;
+    plan->eta = material->layers[0][0].medium.eta;
     for (size_t i = 0; i < scene->object_count; i++)
         plan->has_specular |= scene->objects[i].has_specular;
     for (size_t i = 0; i < scene->light_count; i++)

@@ -22,10 +22,12 @@ static inline struct io_material marble(void)
 {
     const double sigma_a[3] = { 0.0021, 0.0041, 0.0071 }, sigma_s_prime[3] = { 2.19, 2.62, 3.00 };
     struct io_material material = { .name = "marble" };
+    dipole_medium media[3];
     for (int c = 0; c < 3; c++)
-        material.medium[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a[c],
-                                              .sigma_s_prime_per_mm = sigma_s_prime[c],
-                                              .eta = 1.5 };
+        media[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a[c],
+                                    .sigma_s_prime_per_mm = sigma_s_prime[c],
+                                    .eta = 1.5 };
+    io_material_set_media(&material, media);
     return material;
 }
 
@@ -34,10 +36,12 @@ static inline struct io_material skin1(void)
 {
     const double sigma_a[3] = { 0.032, 0.17, 0.48 }, sigma_s_prime[3] = { 0.74, 0.88, 1.01 };
     struct io_material material = { .name = "skin1" };
+    dipole_medium media[3];
     for (int c = 0; c < 3; c++)
-        material.medium[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a[c],
-                                              .sigma_s_prime_per_mm = sigma_s_prime[c],
-                                              .eta = 1.3 };
+        media[c] = (dipole_medium){ .sigma_a_per_mm = sigma_a[c],
+                                    .sigma_s_prime_per_mm = sigma_s_prime[c],
+                                    .eta = 1.3 };
+    io_material_set_media(&material, media);
     return material;
 }
 

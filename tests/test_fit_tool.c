@@ -88,8 +88,8 @@ static void coefficients_come_back_from_a_rendered_picture(void **state)
     assert_true(io_material_read("found.json", &found, NULL));
     for (size_t c = 0; c < 3; c++) {
         const json_t *const channel = json_array_get(json_object_get(printed, "channels"), c);
-        const double sigma_a = truth.medium[c].sigma_a_per_mm,
-                     sigma_s = truth.medium[c].sigma_s_prime_per_mm;
+        const double sigma_a = truth.layers[c][0].medium.sigma_a_per_mm,
+                     sigma_s = truth.layers[c][0].medium.sigma_s_prime_per_mm;
         assert_close(number_at(channel, "sigma_a_per_mm", 0), sigma_a, 0.01, "sigma_a %zu", c);
         assert_close(number_at(channel, "sigma_s_prime_per_mm", 0), sigma_s, 0.01, "sigma_s' %zu", c);
         assert_true(number_at(channel, "sigma_a_ci95", 0) <= sigma_a);
@@ -97,8 +97,10 @@ static void coefficients_come_back_from_a_rendered_picture(void **state)
         assert_true(number_at(channel, "sigma_s_prime_ci95", 0) <= sigma_s);
         assert_true(number_at(channel, "sigma_s_prime_ci95", 1) >= sigma_s);
         assert_true(json_is_true(json_object_get(channel, "identifiable")));
-        assert_close(found.medium[c].sigma_a_per_mm, number_at(channel, "sigma_a_per_mm", 0), 0.0, "file");
-        assert_close(found.medium[c].eta, truth.medium[c].eta, 0.0, "eta of the scene's material");
+        assert_close(found.layers[c][0].medium.sigma_a_per_mm, number_at(channel, "sigma_a_per_mm", 0), 0.0,
+                     "file");
+        assert_close(found.layers[c][0].medium.eta, truth.layers[c][0].medium.eta, 0.0,
+                     "eta of the scene's material");
     }
     json_decref(printed);
     json_decref(written);
@@ -112,7 +114,8 @@ static void coefficients_come_back_from_a_rendered_picture(void **state)
     struct io_material again;
     assert_true(io_material_read("again.json", &again, NULL));
     for (size_t c = 0; c < 3; c++)
-        assert_close(again.medium[c].sigma_a_per_mm, found.medium[c].sigma_a_per_mm, 1e-5, "start %zu", c);
+        assert_close(again.layers[c][0].medium.sigma_a_per_mm, found.layers[c][0].medium.sigma_a_per_mm,
+                     1e-5, "start %zu", c);
 
     /* a full disk leaves what was there */
     const int entry_count = count_entries(".");
@@ -121,6 +124,31 @@ static void coefficients_come_back_from_a_rendered_picture(void **state)
     assert_int_equal(run.exit_code, 1);
     assert_non_null(strstr(run.err, "fit: full.json: "));
     assert_int_equal(count_entries("."), entry_count);
+    free(run.out);
+}
+
+/* Oracle: exact messages for a scene and for a start that fit cannot do, exit code 1, and nothing written.
+ */
+static void other_models_are_refused(void **state)
+{
+    (void)state;
+    struct tool_run run = { 0 };
+    write_text("knot.json", knot);
+    write_picture("grey.exr", 160, 120, 3);
+    write_text("beam.json", "{ \"name\": \"b\", \"eta\": 1.5, \"model\": \"beam\",\n"
+                            "  \"sigma_a_per_mm\": [1, 1, 1], \"sigma_s_prime_per_mm\": [1, 1, 1] }\n");
+    write_knot_with("slab.json", "\"marble\"",
+                    "{ \"name\": \"s\", \"eta\": 1.5, \"layers\": [{ \"thickness_mm\": 2,\n"
+                    "  \"sigma_a_per_mm\": [1, 1, 1], \"sigma_s_prime_per_mm\": [1, 1, 1] }] }");
+    run_tool(&run, "fit", "slab.json", "grey.exr", "-o", "found.json");
+    assert_failed(&run, 1,
+                  "fit: slab.json:4:66: objects[0].material.layers cannot be done by this program, which "
+                  "knows the classical dipole only, expected one medium with the model \"dipole\"\n");
+    run_tool(&run, "fit", "knot.json", "grey.exr", "-o", "found.json", "--start", "beam.json");
+    assert_failed(&run, 1,
+                  "fit: beam.json:1:37: model is \"beam\", which cannot be done by this program, expected "
+                  "\"dipole\"\n");
+    assert_int_equal(count_entries("."), 4);
     free(run.out);
 }
 
@@ -164,12 +192,12 @@ static void a_coarse_picture_is_taken_at_its_word(void **state)
     assert_true(number_at(silent, "rms_residual", 0) > 2e-3);
     for (size_t c = 0; c < 3; c++) {
         const json_t *const channel = json_array_get(json_object_get(stated, "channels"), c);
-        assert_close(number_at(channel, "sigma_a_per_mm", 0), truth.medium[c].sigma_a_per_mm, 0.01, "%zu",
-                     c);
+        assert_close(number_at(channel, "sigma_a_per_mm", 0), truth.layers[c][0].medium.sigma_a_per_mm,
+                     0.01, "%zu", c);
         assert_true(interval_width(silent, c, "sigma_a_ci95") >
                     2.0 * interval_width(stated, c, "sigma_a_ci95"));
         assert_true(interval_width(stated, c, "sigma_s_prime_ci95") >
-                    0.015 * truth.medium[c].sigma_s_prime_per_mm);
+                    0.015 * truth.layers[c][0].medium.sigma_s_prime_per_mm);
     }
     json_decref(stated);
     json_decref(silent);
@@ -192,12 +220,14 @@ static void a_channel_without_light_keeps_the_start(void **state)
     assert_true(io_material_read(marble_path, &truth, NULL));
     assert_true(io_material_read(skin1_path, &start, NULL));
     assert_true(io_material_read("found.json", &found, NULL));
-    assert_close(found.medium[0].sigma_a_per_mm, truth.medium[0].sigma_a_per_mm, 0.01, "red");
+    assert_close(found.layers[0][0].medium.sigma_a_per_mm, truth.layers[0][0].medium.sigma_a_per_mm, 0.01,
+                 "red");
     json_t *const written = json_load_file("found.json", 0, NULL);
     const json_t *const channels = json_object_get(json_object_get(written, "fit"), "channels");
     for (size_t c = 1; c < 3; c++) {
-        assert_close(found.medium[c].sigma_a_per_mm, start.medium[c].sigma_a_per_mm, 1e-15, "%zu", c);
-        assert_close(found.medium[c].eta, truth.medium[c].eta, 0.0, "%zu", c);
+        assert_close(found.layers[c][0].medium.sigma_a_per_mm, start.layers[c][0].medium.sigma_a_per_mm,
+                     1e-15, "%zu", c);
+        assert_close(found.layers[c][0].medium.eta, truth.layers[c][0].medium.eta, 0.0, "%zu", c);
         assert_true(json_is_false(json_object_get(json_array_get(channels, c), "identifiable")));
     }
     json_decref(written);
@@ -303,6 +333,7 @@ int main(void)
         tool_test(a_coarse_picture_is_taken_at_its_word),
         tool_test(a_channel_without_light_keeps_the_start),
         tool_test(bad_inputs_are_refused_in_one_line),
+        tool_test(other_models_are_refused),
         tool_test(a_truncated_picture_is_refused),
         tool_test(a_picture_of_nothing_is_refused),
         tool_test(wrong_usage_is_told),

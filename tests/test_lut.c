@@ -22,8 +22,8 @@ static struct io_material read_bundled(const char *name, double factor)
     if (!io_material_read(path, &material, &status))
         fail_msg("%s: %s", status.source, status.message);
     for (int c = 0; c < 3; c++) {
-        material.medium[c].sigma_a_per_mm *= factor;
-        material.medium[c].sigma_s_prime_per_mm *= factor;
+        material.layers[c][0].medium.sigma_a_per_mm *= factor;
+        material.layers[c][0].medium.sigma_s_prime_per_mm *= factor;
     }
     return material;
 }
@@ -31,9 +31,10 @@ static struct io_material read_bundled(const char *name, double factor)
 static struct io_material make_material(double sigma_a, double sigma_s_prime)
 {
     struct io_material material = { .name = "made" };
-    for (int c = 0; c < 3; c++)
-        material.medium[c] =
-            (dipole_medium){ .sigma_a_per_mm = sigma_a, .sigma_s_prime_per_mm = sigma_s_prime, .eta = 1.3 };
+    const dipole_medium medium = { .sigma_a_per_mm = sigma_a,
+                                   .sigma_s_prime_per_mm = sigma_s_prime,
+                                   .eta = 1.3 };
+    io_material_set_media(&material, (const dipole_medium[]){ medium, medium, medium });
     return material;
 }
 
@@ -49,7 +50,7 @@ static struct lut_splat1d *bake(const struct io_material *material, double epsil
 static dipole_coefficients coefficients_of(const struct io_material *material, int channel)
 {
     dipole_coefficients c;
-    assert_true(dipole_coefficients_init(&material->medium[channel], &c, NULL));
+    assert_true(dipole_coefficients_init(&material->layers[channel][0].medium, &c, NULL));
     return c;
 }
 
@@ -228,8 +229,8 @@ static void edges_of_the_range_bake(void **state)
     /* A channel without scattering has no say in where the table ends. */
     material = make_material(0.5, 2);
     const dipole_coefficients k = coefficients_of(&material, 0);
-    material.medium[1].sigma_a_per_mm = 1e-3;
-    material.medium[1].sigma_s_prime_per_mm = 0;
+    material.layers[1][0].medium.sigma_a_per_mm = 1e-3;
+    material.layers[1][0].medium.sigma_s_prime_per_mm = 0;
     lut = bake(&material, 0.001, true);
     assert_true(lut->axis.r_max_mm == dipole_r_max_mm(&k, 0.001));
     for (int i = 0; i < lut->axis.node_count; i++)
@@ -342,8 +343,8 @@ static void tables_come_back_as_they_were(void **state)
     (void)state;
     for (int is_half = 0; is_half < 2; is_half++) {
         struct io_material material = read_bundled("skin1", 1);
-        material.medium[0].fdr_kind = material.medium[1].fdr_kind = material.medium[2].fdr_kind =
-            is_half ? DIPOLE_FDR_POLYNOMIAL : DIPOLE_FDR_EXACT;
+        material.layers[0][0].medium.fdr_kind = material.layers[1][0].medium.fdr_kind =
+            material.layers[2][0].medium.fdr_kind = is_half ? DIPOLE_FDR_POLYNOMIAL : DIPOLE_FDR_EXACT;
         struct lut_splat1d *const lut = bake(&material, 0.002, is_half), *back = NULL;
         dipole_status status = { 0 };
         if (!lut_splat1d_write(lut, "skin1.exr", is_half, &status) ||
@@ -351,11 +352,13 @@ static void tables_come_back_as_they_were(void **state)
             fail_msg("%s", status.message);
         assert_string_equal(back->material.name, material.name);
         for (int c = 0; c < 3; c++) {
-            assert_true(back->material.medium[c].sigma_a_per_mm == material.medium[c].sigma_a_per_mm);
-            assert_true(back->material.medium[c].sigma_s_prime_per_mm ==
-                        material.medium[c].sigma_s_prime_per_mm);
-            assert_true(back->material.medium[c].eta == material.medium[c].eta);
-            assert_int_equal(back->material.medium[c].fdr_kind, material.medium[c].fdr_kind);
+            assert_true(back->material.layers[c][0].medium.sigma_a_per_mm ==
+                        material.layers[c][0].medium.sigma_a_per_mm);
+            assert_true(back->material.layers[c][0].medium.sigma_s_prime_per_mm ==
+                        material.layers[c][0].medium.sigma_s_prime_per_mm);
+            assert_true(back->material.layers[c][0].medium.eta == material.layers[c][0].medium.eta);
+            assert_int_equal(back->material.layers[c][0].medium.fdr_kind,
+                             material.layers[c][0].medium.fdr_kind);
         }
         assert_true(back->epsilon == lut->epsilon && back->max_relative_error == lut->max_relative_error);
         assert_true(back->axis.r_max_mm == lut->axis.r_max_mm && back->axis.scale_mm == lut->axis.scale_mm);

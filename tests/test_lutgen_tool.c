@@ -121,6 +121,27 @@ static void bad_input_is_named_and_nothing_written(void **state)
     assert_int_equal(count_entries("out"), -1);
 }
 
+/* Oracle: exact messages; a table that lutgen can bake, asked for beside, is not written either. */
+static void other_models_are_refused_and_nothing_written(void **state)
+{
+    (void)state;
+    write_text("beam.json", "{ \"name\": \"b\", \"eta\": 1.3, \"model\": \"beam\",\n"
+                            "  \"sigma_a_per_mm\": [1, 1, 1], \"sigma_s_prime_per_mm\": [1, 1, 1] }\n");
+    write_text("slab.json", "{ \"name\": \"s\", \"eta\": 1.3,\n  \"layers\": [{ \"thickness_mm\": 2,\n"
+                            "  \"sigma_a_per_mm\": [1, 1, 1], \"sigma_s_prime_per_mm\": [1, 1, 1] }] }\n");
+    run_tool(&run, "lutgen", MATERIALS "marble.json", "beam.json", "-o", "out");
+    assert_failed(
+        &run, 1,
+        "lutgen: beam.json:1:37: model is \"beam\", which cannot be done by this program, expected "
+        "\"dipole\"\n");
+    run_tool(&run, "lutgen", MATERIALS "marble.json", "slab.json", "-o", "out");
+    assert_failed(
+        &run, 1,
+        "lutgen: slab.json:2:13: layers cannot be done by this program, which knows the classical "
+        "dipole only, expected one medium with the model \"dipole\"\n");
+    assert_int_equal(count_entries("out"), -1);
+}
+
 /* Oracle: exact messages, exit code 2. */
 static void wrong_usage_is_explained(void **state)
 {
@@ -187,10 +208,15 @@ static int free_run(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        tool_test(every_bundled_material_is_baked), tool_test(two_runs_give_the_same_bytes),
-        tool_test(people_get_a_table_with_units),   tool_test(bad_input_is_named_and_nothing_written),
-        tool_test(wrong_usage_is_explained),        tool_test(unit_slips_are_noted),
-        tool_test(full_disk_leaves_what_was_there), tool_test(unwritable_output_is_named),
+        tool_test(every_bundled_material_is_baked),
+        tool_test(two_runs_give_the_same_bytes),
+        tool_test(people_get_a_table_with_units),
+        tool_test(bad_input_is_named_and_nothing_written),
+        tool_test(other_models_are_refused_and_nothing_written),
+        tool_test(wrong_usage_is_explained),
+        tool_test(unit_slips_are_noted),
+        tool_test(full_disk_leaves_what_was_there),
+        tool_test(unwritable_output_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, free_run);
 }

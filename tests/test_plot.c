@@ -431,6 +431,46 @@ static void png_has_the_size_asked(void **state)
     free(svg);
 }
 
+/* Oracle: the order of the series; labels of a legend stand below each other, whatever the lines do. */
+static void a_legend_keeps_the_order_of_the_series(void **state)
+{
+    (void)state;
+    static const double x[] = { 1, 2 }, high[] = { 1, 9 }, low[] = { 1, 2 }, one[] = { 1, 1 };
+    static const struct plot_series series[] = {
+        { .label = "low", .count = 2, .x = x, .y = low },
+        { .label = "high", .count = 2, .x = x, .y = high, .is_thin = true },
+        { .kind = PLOT_POINTS,
+          .label = "points",
+          .count = 2,
+          .x = x,
+          .y = low,
+          .y_low = one,
+          .y_high = low,
+          .color = "#333333",
+          .mark = PLOT_SQUARE,
+          .is_hollow = true },
+    };
+    const struct plot plot = { .series = series, .series_count = 3, .has_legend = true };
+    char *const svg = draw(&plot);
+    assert_well_formed(svg);
+    assert_drawable(svg);
+    double y_px[3];
+    for (int i = 0; i < 3; i++) {
+        char label[32];
+        snprintf(label, sizeof label, ">%s<", series[i].label);
+        const char *text = strstr(svg, label);
+        assert_non_null(text);
+        while (strncmp(text, "y=\"", 3) != 0)
+            text--;
+        y_px[i] = strtod(text + 3, NULL);
+    }
+    assert_true(y_px[0] < y_px[1] && y_px[1] < y_px[2]);
+    assert_int_equal(count_of(svg, "stroke-width=\"1.2\" stroke-linejoin"), 1);
+    assert_int_equal(count_of(svg, "<path fill=\"none\" stroke=\"#333333\" stroke-width=\"1.2\""), 3);
+    assert_int_equal(count_of(svg, "h8M"), 1); /* the first point's interval is none */
+    free(svg);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -445,6 +485,7 @@ int main(void)
         cmocka_unit_test(empty_plots_say_so),
         cmocka_unit_test(marker_labels_never_touch),
         cmocka_unit_test(series_labels_never_touch),
+        cmocka_unit_test(a_legend_keeps_the_order_of_the_series),
         cmocka_unit_test(bytes_depend_on_the_plot_alone),
         cmocka_unit_test(png_has_the_size_asked),
     };

@@ -115,7 +115,7 @@ static struct deviation deviation_from_sum(enum io_primitive primitive, double s
             continue;
         for (int c = 0; c < 3; c++) {
             dipole_coefficients k;
-            assert_true(dipole_coefficients_init(&material.medium[c], &k, NULL));
+            assert_true(dipole_coefficients_init(&material.layers[c][0].medium, &k, NULL));
             const double r_max_mm = is_truncated ? report.r_max_mm : INFINITY;
             deviation_add(&deviation, (double)image->pixels[4 * i + (size_t)c],
                           summed_radiance(captured, i, c, &k, r_max_mm));
@@ -193,7 +193,7 @@ static void splats_approach_the_surface_integral(void **state)
         init_lit(&test, IO_PRIMITIVE_SPHERE, radius_mm, is_back, &material);
         dipole_coefficients k[3];
         for (int c = 0; c < 3; c++)
-            assert_true(dipole_coefficients_init(&material.medium[c], &k[c], NULL));
+            assert_true(dipole_coefficients_init(&material.layers[c][0].medium, &k[c], NULL));
         const double *const direction = test.lights[0].direction;
         const double toward_light[3] = { -direction[0], -direction[1], -direction[2] };
         struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
@@ -241,7 +241,7 @@ static void energy_is_conserved(void **state)
         double reach_mm = 0, reflectance[3];
         for (int c = 0; c < 3; c++) {
             dipole_coefficients k;
-            assert_true(dipole_coefficients_init(&material.medium[c], &k, NULL));
+            assert_true(dipole_coefficients_init(&material.layers[c][0].medium, &k, NULL));
             reach_mm = fmax(reach_mm, dipole_r_max_mm(&k, epsilon / 2));
             reflectance[c] = dipole_diffuse_reflectance(&k);
         }
@@ -259,7 +259,7 @@ static void energy_is_conserved(void **state)
         const struct render_options options = { .technique = RENDER_TECHNIQUE_SPLAT, .epsilon = epsilon };
         struct render_report report;
         struct io_image *const image = draw(renderer, &options, &report);
-        const double eta = material.medium[0].eta;
+        const double eta = material.layers[0][0].medium.eta;
         const double leaving = 1 - dipole_fresnel_reflectance(eta, 1);
         double worst = 0;
         for (int i = 0; i < 16 * 4; i++) {
@@ -364,7 +364,7 @@ static void lambert_is_the_closed_form_on_a_flat_face(void **state)
             assert_close((double)image->pixels[i], 1, 0, "coverage");
             continue;
         }
-        assert_true(dipole_coefficients_init(&test.objects[0].material.medium[i % 4], &k, NULL));
+        assert_true(dipole_coefficients_init(&test.objects[0].material.layers[i % 4][0].medium, &k, NULL));
         const double radiosity =
             dipole_diffuse_reflectance(&k) * 2 * cosine * (1 - dipole_fresnel_reflectance(1.5, cosine));
         const double exit = (1 - dipole_fresnel_reflectance(1.5, 1)) / (PI * dipole_fdt_outside(1.5));

@@ -119,6 +119,37 @@ static void bad_input_is_one_line_and_no_picture(void **state)
                "render: bad.exr: cannot be written: File too large\n");
 }
 
+/* Oracle: the exact messages, with the tables' folder asked for or not. */
+static void other_models_are_refused(void **state)
+{
+    (void)state;
+    write_file(
+        "slab.json",
+        "{ \"camera\": { \"eye\": [0, 0, 30], \"target\": [0, 0, 0] },\n"
+        "  \"lights\": [{ \"kind\": \"directional\", \"direction\": [0.8, -0.6, -0.3], "
+        "\"irradiance\": 3 }],\n"
+        "  \"objects\": [{ \"primitive\": \"sphere\", \"material\": \"skin1\" },\n"
+        "    { \"primitive\": \"cube\", \"material\": { \"name\": \"s\", \"eta\": 1.3, \"layers\": [{\n"
+        "      \"thickness_mm\": 2, \"sigma_a_per_mm\": [1, 1, 1], \"sigma_s_prime_per_mm\": [1, 1, 1] }] "
+        "} "
+        "}] }\n");
+    write_file(
+        "beam.json",
+        "{ \"camera\": { \"eye\": [0, 0, 30], \"target\": [0, 0, 0] },\n"
+        "  \"lights\": [{ \"kind\": \"directional\", \"direction\": [0.8, -0.6, -0.3], "
+        "\"irradiance\": 3 }],\n"
+        "  \"objects\": [{ \"primitive\": \"sphere\", \"material\": { \"name\": \"b\", \"eta\": 1.3, "
+        "\"model\": \"beam\",\n"
+        "    \"sigma_a_per_mm\": [1, 1, 1], \"sigma_s_prime_per_mm\": [1, 1, 1] } }] }\n");
+    fails_with(RENDER " slab.json -o bad.png", 1,
+               "render: slab.json:4:77: objects[1].material.layers cannot be done by this program, which "
+               "knows the classical dipole only, expected one medium with the model \"dipole\"\n");
+    fails_with(
+        RENDER " beam.json -o bad.exr --luts tables", 1,
+        "render: beam.json:3:88: objects[0].material.model is \"beam\", which cannot be done by this "
+        "program, expected \"dipole\"\n");
+}
+
 /* Oracle: the same for the command line itself. What comes in later versions is unknown now. */
 static void wrong_usage_is_code_2(void **state)
 {
@@ -271,6 +302,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(bad_input_is_one_line_and_no_picture, setup),
+        cmocka_unit_test_setup(other_models_are_refused, setup),
         cmocka_unit_test_setup(wrong_usage_is_code_2, setup),
         cmocka_unit_test_setup(a_missing_context_names_what_was_tried, setup),
         cmocka_unit_test_setup(results_are_told_as_promised, setup),

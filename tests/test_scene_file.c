@@ -98,7 +98,7 @@ static void defaults_are_as_documented(void **state)
     assert_int_equal(scene->object_count, 1);
     assert_string_equal(scene->objects[0].name, "sphere");
     assert_string_equal(scene->objects[0].material.name, "m");
-    assert_true(scene->objects[0].material.medium[2].sigma_a_per_mm == 2);
+    assert_true(scene->objects[0].material.layers[2][0].medium.sigma_a_per_mm == 2);
     assert_true(scene->objects[0].roughness == 0.3);
     assert_true(scene->objects[0].has_specular);
     for (int axis = 0; axis < 3; axis++) {
@@ -246,7 +246,7 @@ static void materials_come_in_three_ways(void **state)
     assert_int_equal(scene->object_count, 4);
     assert_string_equal(scene->objects[0].material.name, "m");
     assert_string_equal(scene->objects[1].material.name, "Marble");
-    assert_true(scene->objects[1].material.medium[0].sigma_s_prime_per_mm == 2.19);
+    assert_true(scene->objects[1].material.layers[0][0].medium.sigma_s_prime_per_mm == 2.19);
     assert_true(strlen(scene->objects[2].material.name) > 0);
     assert_string_equal(scene->objects[3].material.name, "m");
     io_scene_destroy(scene);
