@@ -314,6 +314,23 @@ void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face, c
         values[i] = profile(stack, face, r_mm[i]);
 }
 
+/* Of an inverse Hankel transform: the power within and beyond, the smaller one by its own integral. */
+static void powers(const dipole_stack *stack, dipole_face face, double r_mm, double *within, double *beyond)
+{
+    const double total = stack->total[face];
+    if (r_mm < stack->r_floor_mm) {
+        *within = fmin(total, PI * r_mm * r_mm * profile(stack, face, r_mm));
+        *beyond = total - *within;
+        return;
+    }
+    *beyond = isinf(r_mm) ? 0.0 : fmax(0.0, dipole_hankel_beyond(&stack->hankel[face], r_mm));
+    *within = total - *beyond;
+    if (*beyond < 0.5 * total)
+        return;
+    *within = fmin(total, fmax(0.0, dipole_hankel_within(&stack->hankel[face], r_mm)));
+    *beyond = total - *within;
+}
+
 double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r_mm)
 {
     if (!(r_mm >= 0.0))
@@ -323,11 +340,9 @@ double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r
                    ? fmin(stack->coefficients[0].alpha_prime * dipole_row_beyond(&stack->row, 1.0, r_mm),
                           stack->total[face])
                    : 0.0;
-    if (isinf(r_mm))
-        return 0.0;
-    if (r_mm < stack->r_floor_mm)
-        return stack->total[face];
-    return fmin(stack->total[face], fmax(0.0, dipole_hankel_beyond(&stack->hankel[face], r_mm)));
+    double within, beyond;
+    powers(stack, face, r_mm, &within, &beyond);
+    return beyond;
 }
 
 double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r_mm)
@@ -339,14 +354,9 @@ double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r
                    ? fmin(stack->coefficients[0].alpha_prime * dipole_row_within(&stack->row, r_mm),
                           stack->total[face])
                    : 0.0;
-    if (isinf(r_mm))
-        return stack->total[face];
-    if (r_mm < stack->r_floor_mm)
-        return PI * r_mm * r_mm * profile(stack, face, r_mm);
-    const double beyond = dipole_stack_beyond(stack, face, r_mm);
-    if (beyond < 0.5 * stack->total[face])
-        return stack->total[face] - beyond;
-    return fmin(stack->total[face], fmax(0.0, dipole_hankel_within(&stack->hankel[face], r_mm)));
+    double within, beyond;
+    powers(stack, face, r_mm, &within, &beyond);
+    return within;
 }
 
 /* The mean over a wide ring from the power beyond its edges; over a narrow one, where that would cancel, by
