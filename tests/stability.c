@@ -1,14 +1,15 @@
 /*
  * The stability suite: hard inputs by the million, checked for what physics and dipole.h promise, and by
  * the hundred thousand against high precision. Prints the tables of docs/stability.md; fails where a bound
- * does not hold.
+ * does not hold. Here half-spaces, in stability_layers.c stacks.
  *
  *   stability [SCALE]    SCALE times as many inputs, default 1
  */
+#include "stability.h"
+
 #include "oracle.h"
 
-#include "check.h"
-
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,11 +17,21 @@
 
 static int failure_count;
 
+void failed(const char *format, ...)
+{
+    if (failure_count++ >= 20)
+        return;
+    va_list arguments;
+    va_start(arguments, format);
+    vfprintf(stderr, format, arguments);
+    va_end(arguments);
+    fputc('\n', stderr);
+}
+
 static void fail_input(const char *what, const dipole_coefficients *c, double r_mm, double found)
 {
-    if (failure_count++ < 20)
-        fprintf(stderr, "%s: sigma_a %.17g, sigma_s' %.17g, eta %.17g, r %.17g: found %.17g\n", what,
-                c->sigma_a_per_mm, c->sigma_s_prime_per_mm, c->eta, r_mm, found);
+    failed("%s: sigma_a %.17g, sigma_s' %.17g, eta %.17g, r %.17g: found %.17g", what, c->sigma_a_per_mm,
+           c->sigma_s_prime_per_mm, c->eta, r_mm, found);
 }
 
 /* ---- inputs --------------------------------------------------------------------------------------- */
@@ -62,10 +73,8 @@ static dipole_coefficients random_medium(struct rng *rng)
     }
     dipole_coefficients c;
     dipole_status status;
-    if (!dipole_coefficients_init(&medium, &c, &status)) {
-        fprintf(stderr, "refused: %s\n", status.message);
-        failure_count++;
-    }
+    if (!dipole_coefficients_init(&medium, &c, &status))
+        failed("refused: %s", status.message);
     return c;
 }
 
@@ -87,7 +96,7 @@ static double random_distance(struct rng *rng, const dipole_coefficients *c)
 
 /* ---- what must hold for every input --------------------------------------------------------------- */
 
-static bool is_sound(double value)
+bool is_sound(double value)
 {
     return isfinite(value) && value >= 0.0;
 }
@@ -184,22 +193,17 @@ static void sweep_beam(int count)
 
 /* ---- units in the last place, against MPFR -------------------------------------------------------- */
 
-struct errors {
-    const char *name;
-    double bound; /* largest error allowed */
-    size_t count;
-    double *values;
-};
-
-static void errors_add(struct errors *errors, double error, const dipole_coefficients *c, double r_mm,
-                       double found)
+void errors_init(struct errors *errors, size_t limit)
 {
-    errors->values[errors->count++] = error;
-    if (!(error <= errors->bound)) {
-        char what[128];
-        snprintf(what, sizeof what, "%s is %.3g off", errors->name, error);
-        fail_input(what, c, r_mm, found);
-    }
+    errors->values = calloc(limit, sizeof *errors->values);
+    errors->limit = limit;
+}
+
+bool errors_add(struct errors *errors, double error)
+{
+    if (errors->count < errors->limit)
+        errors->values[errors->count++] = error;
+    return error <= errors->bound;
 }
 
 static int compare(const void *a, const void *b)
@@ -208,12 +212,23 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void errors_print(struct errors *errors, const char *unit)
+void errors_print(struct errors *errors, const char *unit)
 {
     qsort(errors->values, errors->count, sizeof *errors->values, compare);
     printf("| %s | %zu | %.2g | %.2g | %.2g | %.2g | %s |\n", errors->name, errors->count,
-           errors->values[errors->count / 2], errors->values[errors->count / 100 * 99],
+           errors->values[errors->count / 2], errors->values[(size_t)(0.99 * (double)errors->count)],
            errors->values[errors->count - 1], errors->bound, unit);
+    free(errors->values);
+}
+
+static void errors_note(struct errors *errors, double error, const dipole_coefficients *c, double r_mm,
+                        double found)
+{
+    if (errors_add(errors, error))
+        return;
+    char what[128];
+    snprintf(what, sizeof what, "%s is %.3g off", errors->name, error);
+    fail_input(what, c, r_mm, found);
 }
 
 enum { PROFILE, WITHIN, TAIL, TOTAL, RING, SPECTRUM, BY_SIGMA_A, BY_SIGMA_S, REACH, KIND_COUNT };
@@ -239,18 +254,18 @@ static void compare_dipole(int count)
 {
     struct rng rng = { .seed = 103 };
     struct errors all[KIND_COUNT] = {
-        [PROFILE] = { "profile", 8.0, 0, NULL },
-        [WITHIN] = { "within", 8.0, 0, NULL },
-        [TAIL] = { "tail", 8.0, 0, NULL },
-        [TOTAL] = { "total", 8.0, 0, NULL },
-        [RING] = { "ring mean", 8.0, 0, NULL },
-        [SPECTRUM] = { "spectrum", 8.0, 0, NULL },
-        [BY_SIGMA_A] = { "dRd/dσa", 64.0, 0, NULL },
-        [BY_SIGMA_S] = { "dRd/dσ's", 64.0, 0, NULL },
-        [REACH] = { "r_max, relative", 1e-12, 0, NULL },
+        [PROFILE] = { .name = "profile", .bound = 8.0 },
+        [WITHIN] = { .name = "within", .bound = 8.0 },
+        [TAIL] = { .name = "tail", .bound = 8.0 },
+        [TOTAL] = { .name = "total", .bound = 8.0 },
+        [RING] = { .name = "ring mean", .bound = 8.0 },
+        [SPECTRUM] = { .name = "spectrum", .bound = 8.0 },
+        [BY_SIGMA_A] = { .name = "dRd/dσa", .bound = 64.0 },
+        [BY_SIGMA_S] = { .name = "dRd/dσ's", .bound = 64.0 },
+        [REACH] = { .name = "r_max, relative", .bound = 1e-12 },
     };
     for (int k = 0; k < KIND_COUNT; k++)
-        all[k].values = calloc((size_t)count, sizeof(double));
+        errors_init(&all[k], (size_t)count);
     for (int i = 0; i < count; i++) {
         const dipole_coefficients c = random_medium(&rng);
         const double r = random_distance(&rng, &c), r_hi = r * (1.0 + log_uniform(&rng, 1e-12, 1e2));
@@ -260,38 +275,36 @@ static void compare_dipole(int count)
         oracle_init(&o, &c);
         double found = dipole_rd_per_mm2(&c, r);
         oracle_rd(&o, r);
-        errors_add(&all[PROFILE], oracle_ulp(&o, found), &c, r, found);
+        errors_note(&all[PROFILE], oracle_ulp(&o, found), &c, r, found);
         found = dipole_reflectance_within(&c, r);
         oracle_between(&o, 0.0, r);
-        errors_add(&all[WITHIN], oracle_ulp(&o, found), &c, r, found);
+        errors_note(&all[WITHIN], oracle_ulp(&o, found), &c, r, found);
         found = dipole_tail_fraction(&c, r);
         oracle_tail(&o, r);
-        errors_add(&all[TAIL], oracle_ulp(&o, found), &c, r, found);
+        errors_note(&all[TAIL], oracle_ulp(&o, found), &c, r, found);
         found = dipole_diffuse_reflectance(&c);
         oracle_between(&o, 0.0, -1.0);
-        errors_add(&all[TOTAL], oracle_ulp(&o, found), &c, r, found);
+        errors_note(&all[TOTAL], oracle_ulp(&o, found), &c, r, found);
         if (r > 0.0 && r_hi > r) {
             found = dipole_rd_ring_mean_per_mm2(&c, r, r_hi);
             oracle_ring_mean(&o, r, r_hi);
-            errors_add(&all[RING], oracle_ulp(&o, found), &c, r, found);
+            errors_note(&all[RING], oracle_ulp(&o, found), &c, r, found);
         }
         found = dipole_spectrum(&c, k);
         oracle_spectrum(&o, k);
-        errors_add(&all[SPECTRUM], oracle_ulp(&o, found), &c, k, found);
+        errors_note(&all[SPECTRUM], oracle_ulp(&o, found), &c, k, found);
         oracle_derivative(&o, &c, true, r);
-        errors_add(&all[BY_SIGMA_A], oracle_ulp(&o, d.d_sigma_a), &c, r, d.d_sigma_a);
+        errors_note(&all[BY_SIGMA_A], oracle_ulp(&o, d.d_sigma_a), &c, r, d.d_sigma_a);
         oracle_derivative(&o, &c, false, r);
-        errors_add(&all[BY_SIGMA_S], oracle_ulp(&o, d.d_sigma_s_prime), &c, r, d.d_sigma_s_prime);
+        errors_note(&all[BY_SIGMA_S], oracle_ulp(&o, d.d_sigma_s_prime), &c, r, d.d_sigma_s_prime);
         if (c.sigma_s_prime_per_mm > 0.0) {
             found = dipole_r_max_mm(&c, epsilon);
-            errors_add(&all[REACH], reach_error(&o, epsilon, found), &c, epsilon, found);
+            errors_note(&all[REACH], reach_error(&o, epsilon, found), &c, epsilon, found);
         }
         oracle_clear(&o);
     }
-    for (int k = 0; k < KIND_COUNT; k++) {
+    for (int k = 0; k < KIND_COUNT; k++)
         errors_print(&all[k], k == REACH ? "1" : "ULP");
-        free(all[k].values);
-    }
 }
 
 /* ---- the beam model's half-space, against the line integral with 256 bits ------------------------- */
@@ -388,11 +401,11 @@ static void line_sum(double r_mm)
 static void compare_beam(int count)
 {
     struct rng rng = { .seed = 104 };
-    struct errors all[] = { { "beam, profile", 8.0, 0, NULL },
-                            { "beam, within", 8.0, 0, NULL },
-                            { "beam, beyond", 8.0, 0, NULL } };
+    struct errors all[] = { { .name = "beam, profile", .bound = 8.0 },
+                            { .name = "beam, within", .bound = 8.0 },
+                            { .name = "beam, beyond", .bound = 8.0 } };
     for (int k = 0; k < 3; k++)
-        all[k].values = calloc((size_t)count, sizeof(double));
+        errors_init(&all[k], (size_t)count);
     for (int i = 0; i < count; i += 10) {
         const dipole_coefficients c = random_medium(&rng);
         const dipole_layer base = { { c.sigma_a_per_mm, c.sigma_s_prime_per_mm, c.eta, DIPOLE_FDR_EXACT },
@@ -415,31 +428,29 @@ static void compare_beam(int count)
             const mpfr_srcptr expected[3] = { line.profile, line.within, line.beyond };
             for (int q = 0; q < 3; q++) {
                 mpfr_set(o.sum, expected[q], MPFR_RNDN);
-                errors_add(&all[q], oracle_ulp(&o, found[q]), &c, r, found[q]);
+                errors_note(&all[q], oracle_ulp(&o, found[q]), &c, r, found[q]);
             }
         }
         line_clear();
         oracle_clear(&o);
         dipole_stack_destroy(stack);
     }
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         errors_print(&all[k], "ULP");
-        free(all[k].values);
-    }
 }
 
-/* ---- many radii at once, and media from what they reflect ----------------------------------------- */
+/* ---- many radii at once ---------------------------------------------------------------------------- */
 
 /* In units of what dipole.h allows: with x = sigma_tr r, 3e-16 (8 + x) of the value, and for derivatives
  * 6e-16 (8 + x) (2 + x) of the value. */
 static void compare_batch(int count)
 {
     struct rng rng = { .seed = 105 };
-    struct errors all[] = { { "profile, batch, of what is stated", 1.0, 0, NULL },
-                            { "gradient, batch, of what is stated", 1.0, 0, NULL } };
+    struct errors all[] = { { .name = "profile, batch, of what is stated", .bound = 1.0 },
+                            { .name = "gradient, batch, of what is stated", .bound = 1.0 } };
     enum { RADII = 37 };
-    all[0].values = calloc((size_t)count, sizeof(double));
-    all[1].values = calloc(2 * (size_t)count, sizeof(double));
+    errors_init(&all[0], (size_t)count);
+    errors_init(&all[1], 2 * (size_t)count);
     for (int i = 0; i < count; i += RADII) {
         const dipole_coefficients c = random_medium(&rng);
         double r[RADII], values[RADII], alone[RADII], d_a[RADII], d_s[RADII];
@@ -453,20 +464,55 @@ static void compare_batch(int count)
             const double x = c.sigma_tr_per_mm * r[k], smallest = 0x1p-1060; /* subnormals aside */
             const double expected = oracle_rd(&o, r[k]);
             const double allowed = 3e-16 * (8.0 + x) * expected + smallest;
-            errors_add(&all[0], fmax(fabs(values[k] - expected), fabs(alone[k] - expected)) / allowed, &c,
-                       r[k], values[k]);
+            errors_note(&all[0], fmax(fabs(values[k] - expected), fabs(alone[k] - expected)) / allowed, &c,
+                        r[k], values[k]);
             const double slope = 2.0 * (2.0 + x) * allowed + 1e-300;
             const double by_a = c.sigma_a_per_mm * oracle_derivative(&o, &c, true, r[k]);
             const double by_s = c.sigma_s_prime_per_mm * oracle_derivative(&o, &c, false, r[k]);
-            errors_add(&all[1], fabs(d_a[k] - by_a) / slope, &c, r[k], d_a[k]);
-            errors_add(&all[1], fabs(d_s[k] - by_s) / slope, &c, r[k], d_s[k]);
+            errors_note(&all[1], fabs(d_a[k] - by_a) / slope, &c, r[k], d_a[k]);
+            errors_note(&all[1], fabs(d_s[k] - by_s) / slope, &c, r[k], d_s[k]);
         }
         oracle_clear(&o);
     }
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 2; k++)
         errors_print(&all[k], "1");
-        free(all[k].values);
+}
+
+/* ---- media from what they reflect ------------------------------------------------------------------ */
+
+/* From reflectances near 0, near 1 and in between, and either length, to the medium and back (T28). */
+static void compare_inversions(int count)
+{
+    struct rng rng = { .seed = 106 };
+    struct errors all[] = { { .name = "reflectance after a round trip, relative", .bound = 1e-12 },
+                            { .name = "mean free path after it, relative", .bound = 1e-12 } };
+    for (int k = 0; k < 2; k++)
+        errors_init(&all[k], (size_t)count);
+    for (int i = 0; i < count; i++) {
+        const double reflectance = i % 3 == 0   ? log_uniform(&rng, 1e-30, 1.0)
+                                   : i % 3 == 1 ? 1.0 - log_uniform(&rng, 2e-16, 1.0)
+                                                : uniform(&rng, 0.0, 1.0);
+        const double length = log_uniform(&rng, 1e-12, 1e6), eta = log_uniform(&rng, 0.5, 3.0);
+        const dipole_model model = i % 2 ? DIPOLE_MODEL_BEAM : DIPOLE_MODEL_DIPOLE;
+        const bool is_diffuse = i / 2 % 2;
+        dipole_medium medium;
+        dipole_status status;
+        dipole_coefficients c;
+        if (!(is_diffuse ? dipole_medium_from_diffuse_mean_free_path : dipole_medium_from_mean_free_path)(
+                reflectance, length, eta, DIPOLE_FDR_EXACT, model, &medium, &status) ||
+            !dipole_coefficients_init(&medium, &c, &status)) {
+            failed("reflectance %.17g, length %.17g: %s", reflectance, length, status.message);
+            continue;
+        }
+        const double x = c.sigma_tr_per_mm * c.mean_free_path_mm, b = 2.0 / 3.0 * c.boundary_a;
+        const double back = model == DIPOLE_MODEL_BEAM ? c.alpha_prime / ((1.0 + x) * (1.0 + b * x))
+                                                       : dipole_diffuse_reflectance(&c);
+        const double length_back = is_diffuse ? 1.0 / c.sigma_tr_per_mm : c.mean_free_path_mm;
+        errors_note(&all[0], fabs(back / reflectance - 1.0), &c, reflectance, back);
+        errors_note(&all[1], fabs(length_back / length - 1.0), &c, length, length_back);
     }
+    for (int k = 0; k < 2; k++)
+        errors_print(&all[k], "1");
 }
 
 int main(int argc, char **argv)
@@ -479,11 +525,14 @@ int main(int argc, char **argv)
     printf("| model | inputs | held |\n|---|---|---|\n");
     sweep_dipole((int)(1e6 * scale));
     sweep_beam((int)(2e4 * scale));
+    sweep_layers((int)(2e4 * scale));
     printf(
         "\n| quantity | inputs | median | 99 %% | worst | bound | unit |\n|---|---|---|---|---|---|---|\n");
     compare_dipole((int)(1e5 * scale));
     compare_batch((int)(2e4 * scale));
     compare_beam((int)(2e3 * scale));
+    compare_inversions((int)(1e5 * scale));
+    compare_layers((int)(2e4 * scale));
     printf("\n%d failures\n", failure_count);
     mpfr_free_cache();
     return failure_count > 0;
