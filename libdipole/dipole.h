@@ -234,7 +234,7 @@ typedef enum dipole_model {
     DIPOLE_MODEL_DIPOLE = 0,    /* Jensen et al. 2001; a half-space; T5                              */
     DIPOLE_MODEL_BETTER_DIPOLE, /* d'Eon 2012; a half-space; T24                                     */
     DIPOLE_MODEL_MULTIPOLE,     /* Donner and Jensen 2005; layers thicker than one mean free path; T25 */
-    DIPOLE_MODEL_BEAM,          /* extended source, partial-current boundary; any layers; T16, T17   */
+    DIPOLE_MODEL_BEAM,          /* extended source, partial-current boundary; any layers; T22, T23   */
 } dipole_model;
 
 /* One layer, top first. thickness_mm: 1e-50 to 1e50, or INFINITY for the last (a half-space). */
@@ -285,10 +285,9 @@ DIPOLE_API double dipole_stack_spectrum(const dipole_stack *stack, dipole_face f
  * Profile: power leaving per mm^2 at each of count radii, for one unit of power entering, in 1/mm^2.
  *
  *   r_mm     distances, >= 0; values is count doubles, NaN where r_mm is negative or NaN
- *   Relative error below 1e-9; of light through layers that let less than 1e-6 of it through, more: the
- * error is below 1e-15 of what a layer one mean free path thick would let through. The beam model has an
- * integrable logarithm at r = 0: below 1e-9 mean free paths of the thinnest-scattering layer the value
- * there is continued.
+ *   Of layers the error is below 1e-11 of the value at r = 0 (T26), of a half-space below 8 units in the
+ * last place (T5, T22). The beam model has an integrable logarithm at r = 0: below 1e-9 of the shortest
+ * mean free path the value there is continued.
  */
 DIPOLE_API void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face,
                                              const double *r_mm, size_t count, double *values);
@@ -298,8 +297,8 @@ DIPOLE_API void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_f
 DIPOLE_API double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face face,
                                                  double r_lo_mm, double r_hi_mm);
 
-/* Power leaving within and beyond r_mm, 0 to the total; neither loses digits where it is small, but for
- * beyond over a lossless base of several layers, which is exact to 1e-15 of the total. T26 */
+/* Power leaving within and beyond r_mm, 0 to the total; of layers exact to 1e-12 of the total, of a
+ * half-space neither loses digits where it is small. T22, T26 */
 DIPOLE_API double dipole_stack_within(const dipole_stack *stack, dipole_face face, double r_mm);
 DIPOLE_API double dipole_stack_beyond(const dipole_stack *stack, dipole_face face, double r_mm);
 

@@ -255,6 +255,48 @@ static void profiles_of_any_layers_fall(void **state)
     }
 }
 
+/* Oracle: the integral. The power between two radii, from K_1, is the integral of the profile, from K_0. */
+static void powers_are_integrals_of_profiles(void **state)
+{
+    (void)state;
+    static const double gauss[5][2] = { { 0.0, 0.28444444444444444444 },
+                                        { -0.53846931010568309104, 0.23931433524968323402 },
+                                        { 0.53846931010568309104, 0.23931433524968323402 },
+                                        { -0.90617984593866399280, 0.11846344252809454376 },
+                                        { 0.90617984593866399280, 0.11846344252809454376 } };
+    double worst = 0.0;
+    struct rng rng = { .seed = 60 };
+    for (int i = 0; i < 400 / SLOWNESS; i++) {
+        dipole_layer layers[RANDOM_LAYERS];
+        const size_t count = random_layers(&rng, layers);
+        dipole_stack *const stack = stack_of(layers, count, DIPOLE_MODEL_BEAM);
+        for (int f = 0; f < 2; f++) {
+            const dipole_face face = (dipole_face)f;
+            const double total = dipole_stack_total(stack, face), top = profile(stack, face, 0.0);
+            if (!(total > least && top > least))
+                continue;
+            const double r = sqrt(total / top) * log_uniform(&rng, 1e-2, 30.0), r_hi = 1.5 * r;
+            double sum = 0.0;
+            for (int panel = 0; panel < 8; panel++)
+                for (int k = 0; k < 5; k++) {
+                    const double share = (panel + 0.5 + 0.5 * gauss[k][0]) / 8.0;
+                    const double at = sqrt(r * r + share * (r_hi - r) * (r_hi + r));
+                    sum += gauss[k][1] / 8.0 * profile(stack, face, at);
+                }
+            sum *= PI * (r_hi - r) * (r_hi + r);
+            const double found =
+                dipole_stack_beyond(stack, face, r) - dipole_stack_beyond(stack, face, r_hi);
+            const double error = fabs(found - sum) / total;
+            if (!(error <= 1e-12))
+                fail_msg("case %d, face %d, r %g: %.15g, the integral is %.15g of %g", i, f, r, found, sum,
+                         total);
+            worst = fmax(worst, error);
+        }
+        dipole_stack_destroy(stack);
+    }
+    print_message("  worst error %.1e of the total\n", worst);
+}
+
 /*
  * Oracle: order, for the multipole, whose layers are thicker than a mean free path. Its profile falls where
  * no face's extrapolated boundary is farther from it than the middle of the layer (T25); else the far
@@ -421,6 +463,7 @@ int main(void)
         cmocka_unit_test(derivatives_agree_with_mpfr),
         cmocka_unit_test(energy_is_kept_by_any_layers),
         cmocka_unit_test(profiles_of_any_layers_fall),
+        cmocka_unit_test(powers_are_integrals_of_profiles),
         cmocka_unit_test(profiles_of_any_multipole_are_finite),
         cmocka_unit_test(derivatives_of_any_layers_are_sound),
         cmocka_unit_test(profile_gradients_are_the_slopes_of_the_profiles),
