@@ -225,7 +225,7 @@ int main(int argc, char **argv)
           .target = &options.at_mm,
           .argument = "R,R,...",
           .min = 0,
-          .max = DIPOLE_SIGMA_MAX_PER_MM,
+          .max = 1e300,
           .help = "Distances in mm at which the profile is printed; default 1, 2, 5 per decade." },
         { .name = "plot",
           .letter = 'p',
@@ -272,7 +272,8 @@ int main(int argc, char **argv)
         .details =
             "MATERIAL.json is a file or the name of a bundled material, such as marble.\n\n"
             "mean_free_path is 1/(sigma_a + sigma_s'), diffuse_mean_free_path is 1/sigma_tr: renderers "
-            "call either of them radius. rd is the diffuse reflectance profile: power leaving per mm^2 "
+            "call either of them radius. They, z_r and z_v are those of the classical dipole, whatever the "
+            "model. rd is the diffuse reflectance profile: power leaving per mm^2 "
             "for one unit of power entering; diffuse_reflectance is its integral, r_max the radius "
             "beyond which the part epsilon of it lies, splat_spacing the largest distance of light "
             "samples. td and diffuse_transmittance are the same for light that leaves by the far face of "
