@@ -39,7 +39,7 @@ enum { RADIUS_COUNT = 5, BIN_LIMIT = 1000, CASE_LIMIT = 32, SLAB_LIMIT = 256 };
 static const double ring_middle[RADIUS_COUNT] = { 0.5, 1.0, 2.0, 5.0, 10.0 };
 static const double ring_half_width[RADIUS_COUNT] = { 0.1, 0.1, 0.1, 0.25, 0.5 };
 
-/* A ring of Monte Carlo per light that entered; of R1 the light that was scattered once. */
+/* A ring of Monte Carlo, per mm^2 and per light that entered; of R1 the light that was scattered once. */
 struct bin {
     double lo_mm, hi_mm, r, r_sem, r1;
 };
@@ -51,6 +51,7 @@ struct monte_carlo {
     double mean_free_path_mm; /* the one that the rings are counted in */
     struct bin bins[BIN_LIMIT];
     size_t bin_count;
+    struct bin rings[RADIUS_COUNT];
     double r, r_sem, r1, t, t_sem; /* per light that entered, unscattered light included */
 };
 
@@ -103,6 +104,30 @@ static size_t parse_layers(const char *text, dipole_layer *layers)
     return count;
 }
 
+/* Monte Carlo between two radii, in mean free paths: the bins that lie there, as one ring. */
+static struct bin ring_between(const struct monte_carlo *mc, double lo, double hi)
+{
+    struct bin ring = { .lo_mm = INFINITY };
+    const double slack = 1e-3;
+    for (size_t i = 0; i < mc->bin_count; i++) {
+        const struct bin *const b = &mc->bins[i];
+        if (b->lo_mm < (lo - slack) * mc->mean_free_path_mm ||
+            b->hi_mm > (hi + slack) * mc->mean_free_path_mm)
+            continue;
+        const double area = b->hi_mm * b->hi_mm - b->lo_mm * b->lo_mm;
+        ring.r += area * b->r;
+        ring.r1 += area * b->r1;
+        ring.r_sem = hypot(ring.r_sem, area * b->r_sem);
+        ring.lo_mm = fmin(ring.lo_mm, b->lo_mm);
+        ring.hi_mm = fmax(ring.hi_mm, b->hi_mm);
+    }
+    const double area = ring.hi_mm * ring.hi_mm - ring.lo_mm * ring.lo_mm;
+    ring.r /= area;
+    ring.r1 /= area;
+    ring.r_sem /= area;
+    return ring;
+}
+
 static void read_bins(const char *folder, double entered, struct monte_carlo *mc)
 {
     char name[128], line[4096];
@@ -117,7 +142,10 @@ static void read_bins(const char *folder, double entered, struct monte_carlo *mc
         mc->bins[mc->bin_count++] = b;
     }
     fclose(file);
-    mc->mean_free_path_mm = 20.0 * mc->bins[0].hi_mm; /* the first ring is a twentieth of it wide */
+    mc->mean_free_path_mm = 20.0 * mc->bins[0].hi_mm; /* the first bin is a twentieth of it wide */
+    for (int i = 0; i < RADIUS_COUNT; i++)
+        mc->rings[i] =
+            ring_between(mc, ring_middle[i] - ring_half_width[i], ring_middle[i] + ring_half_width[i]);
 }
 
 static void read_monte_carlo(const char *folder)
@@ -200,30 +228,36 @@ static double percent(double found, double expected)
     return 100.0 * (found / expected - 1.0);
 }
 
-/* The model's mean over the bins between two radii, in percent of Monte Carlo; *noise is the standard error
- * of Monte Carlo, likewise. */
-static double ring_error(const struct monte_carlo *mc, const struct model *model, const dipole_stack *stack,
-                         double lo, double hi, double *noise)
+static double ring_error(const struct bin *ring, const struct model *model, const dipole_stack *stack)
 {
-    double light = 0.0, variance = 0.0, lo_mm = INFINITY, hi_mm = 0.0;
-    const double slack = 1e-3;
-    for (size_t i = 0; i < mc->bin_count; i++) {
-        const struct bin *const b = &mc->bins[i];
-        if (b->lo_mm < (lo - slack) * mc->mean_free_path_mm ||
-            b->hi_mm > (hi + slack) * mc->mean_free_path_mm)
-            continue;
-        const double area = b->hi_mm * b->hi_mm - b->lo_mm * b->lo_mm;
-        light += area * (b->r - (model->is_multiple_only ? b->r1 : 0.0));
-        variance += area * b->r_sem * area * b->r_sem;
-        lo_mm = fmin(lo_mm, b->lo_mm);
-        hi_mm = fmax(hi_mm, b->hi_mm);
-    }
-    *noise = 100.0 * sqrt(variance) / light;
-    const double mean = light / (hi_mm * hi_mm - lo_mm * lo_mm);
-    return percent(dipole_stack_ring_mean_per_mm2(stack, DIPOLE_FACE_LIT, lo_mm, hi_mm), mean);
+    return percent(dipole_stack_ring_mean_per_mm2(stack, DIPOLE_FACE_LIT, ring->lo_mm, ring->hi_mm),
+                   ring->r - (model->is_multiple_only ? ring->r1 : 0.0));
 }
 
 /* ---- tables of Monte Carlo ------------------------------------------------------------------------ */
+
+/* In percent of Monte Carlo. */
+struct errors {
+    bool is_known, has_rings, has_t;
+    double rings[RADIUS_COUNT], r, t;
+};
+
+static struct errors errors_of(const struct monte_carlo *mc, const struct model *model)
+{
+    dipole_stack *const stack = stack_of(model, mc->layers, mc->layer_count);
+    struct errors errors = { .is_known = stack != NULL,
+                             .has_rings = mc->bin_count > 0,
+                             .has_t = mc->t > 0.0 };
+    if (!stack)
+        return errors;
+    for (int i = 0; i < RADIUS_COUNT && errors.has_rings; i++)
+        errors.rings[i] = ring_error(&mc->rings[i], model, stack);
+    errors.r = percent(leaving(stack, DIPOLE_FACE_LIT), mc->r - (model->is_multiple_only ? mc->r1 : 0.0));
+    if (errors.has_t)
+        errors.t = percent(leaving(stack, DIPOLE_FACE_FAR), mc->t);
+    dipole_stack_destroy(stack);
+    return errors;
+}
 
 /* Signed, and with a digit more where it is small. */
 static void print_error(double error)
@@ -234,6 +268,53 @@ static void print_error(double error)
         printf(" %+.1f |", error);
     else
         printf(" %+.0f |", error);
+}
+
+static void print_model(const struct monte_carlo *mc, const struct model *model)
+{
+    const struct errors errors = errors_of(mc, model);
+    printf("| %s |", model->name);
+    if (!errors.is_known) {
+        printf(" *%s* | | | | | | |\n", model->refusal);
+        return;
+    }
+    for (int i = 0; i < RADIUS_COUNT; i++)
+        if (errors.has_rings)
+            print_error(errors.rings[i]);
+        else
+            printf(" |");
+    print_error(errors.r);
+    if (errors.has_t)
+        print_error(errors.t);
+    else
+        printf(" |");
+    printf("\n");
+}
+
+/* How sure Monte Carlo is, and how much of its light was scattered once. */
+static void print_monte_carlo(const struct monte_carlo *mc)
+{
+    printf("| *standard error of Monte Carlo* |");
+    for (int i = 0; i < RADIUS_COUNT; i++)
+        printf(mc->bin_count > 0 ? " *%.1f* |" : " |", 100.0 * mc->rings[i].r_sem / mc->rings[i].r);
+    printf(" *%.2f* |", 100.0 * mc->r_sem / mc->r);
+    printf(mc->t > 0.0 ? " *%.2f* |\n" : " |\n", 100.0 * mc->t_sem / mc->t);
+    printf("| *of its light scattered once* |");
+    for (int i = 0; i < RADIUS_COUNT; i++)
+        printf(mc->bin_count > 0 ? " *%.1f* |" : " |", 100.0 * mc->rings[i].r1 / mc->rings[i].r);
+    printf(" *%.1f* | |\n", 100.0 * mc->r1 / mc->r);
+}
+
+static void print_cases(void)
+{
+    for (size_t i = 0; i < case_count; i++) {
+        printf("\n**%s**: %s\n\n| model | 0.5 ℓ | 1 ℓ | 2 ℓ | 5 ℓ | 10 ℓ | R | T |\n"
+               "|---|---|---|---|---|---|---|---|\n",
+               cases[i].name, cases[i].layers_text);
+        for (size_t m = 0; m < COUNT(models); m++)
+            print_model(&cases[i], &models[m]);
+        print_monte_carlo(&cases[i]);
+    }
 }
 
 /* What all errors of a kind come to. */
@@ -250,87 +331,6 @@ static void summary_add(struct summary *summary, double error)
         summary->worst = error;
 }
 
-static const char *const group_names[] = { "half-spaces, α' > 0.9", "half-spaces, α' < 0.9", "slabs",
-                                           "stacks of layers" };
-enum { GROUP_COUNT = 4, NEAR = 0, FAR, TOTAL, PART_COUNT };
-static struct summary summaries[GROUP_COUNT][COUNT(models)][PART_COUNT];
-
-static int group_of(const struct monte_carlo *mc)
-{
-    const dipole_medium *const medium = &mc->layers[0].medium;
-    if (mc->layer_count > 1)
-        return 3;
-    if (isfinite(mc->layers[0].thickness_mm))
-        return 2;
-    return medium->sigma_s_prime_per_mm > 9.0 * medium->sigma_a_per_mm * 1.0001 ? 0 : 1;
-}
-
-static void print_noise(const struct monte_carlo *mc)
-{
-    dipole_stack *const any = stack_of(&models[COUNT(models) - 1], mc->layers, mc->layer_count);
-    printf("| *standard error of Monte Carlo* |");
-    for (int i = 0; i < RADIUS_COUNT; i++) {
-        double noise = 0.0;
-        if (mc->bin_count > 0)
-            ring_error(mc, &models[0], any, ring_middle[i] - ring_half_width[i],
-                       ring_middle[i] + ring_half_width[i], &noise);
-        printf(mc->bin_count > 0 ? " *%.1f* |" : " |", noise);
-    }
-    printf(" *%.2f* |", 100.0 * mc->r_sem / mc->r);
-    printf(mc->t > 0.0 ? " *%.2f* |\n" : " |\n", 100.0 * mc->t_sem / mc->t);
-    dipole_stack_destroy(any);
-}
-
-static void print_model(const struct monte_carlo *mc, size_t index)
-{
-    const struct model *const model = &models[index];
-    struct summary *const parts = summaries[group_of(mc)][index];
-    dipole_stack *const stack = stack_of(model, mc->layers, mc->layer_count);
-    printf("| %s |", model->name);
-    if (!stack) {
-        printf(" *%s* | | | | | | |\n", model->refusal);
-        return;
-    }
-    for (int i = 0; i < RADIUS_COUNT; i++)
-        if (mc->bin_count > 0) {
-            double noise;
-            const double error = ring_error(mc, model, stack, ring_middle[i] - ring_half_width[i],
-                                            ring_middle[i] + ring_half_width[i], &noise);
-            summary_add(&parts[ring_middle[i] <= 2.0 ? NEAR : FAR], error);
-            print_error(error);
-        } else {
-            printf(" |");
-        }
-    const double r =
-        percent(leaving(stack, DIPOLE_FACE_LIT), mc->r - (model->is_multiple_only ? mc->r1 : 0.0));
-    if (mc->bin_count > 0)
-        summary_add(&parts[TOTAL], r);
-    print_error(r);
-    if (mc->t > 0.0) {
-        const double t = percent(leaving(stack, DIPOLE_FACE_FAR), mc->t);
-        if (mc->bin_count > 0)
-            summary_add(&parts[TOTAL], t);
-        print_error(t);
-        printf("\n");
-    } else {
-        printf(" |\n");
-    }
-    dipole_stack_destroy(stack);
-}
-
-static void print_cases(void)
-{
-    for (size_t i = 0; i < case_count; i++) {
-        const struct monte_carlo *const mc = &cases[i];
-        printf("\n**%s**: %s\n\n| model | 0.5 ℓ | 1 ℓ | 2 ℓ | 5 ℓ | 10 ℓ | R | T |\n"
-               "|---|---|---|---|---|---|---|---|\n",
-               mc->name, mc->layers_text);
-        for (size_t m = 0; m < COUNT(models); m++)
-            print_model(mc, m);
-        print_noise(mc);
-    }
-}
-
 static void print_summary(const struct summary *summary)
 {
     if (summary->count > 0)
@@ -339,20 +339,49 @@ static void print_summary(const struct summary *summary)
         printf(" |");
 }
 
-static void print_summaries(void)
+static const char *const group_names[] = { "half-spaces, α' > 0.9", "half-spaces, α' < 0.9", "slabs",
+                                           "stacks of layers" };
+
+static size_t group_of(const struct monte_carlo *mc)
 {
-    for (int g = 0; g < GROUP_COUNT; g++) {
+    const dipole_medium *const medium = &mc->layers[0].medium;
+    if (mc->layer_count > 1)
+        return 3;
+    if (isfinite(mc->layers[0].thickness_mm))
+        return 2;
+    return medium->sigma_s_prime_per_mm < 9.0 * medium->sigma_a_per_mm;
+}
+
+/* Cases of which only totals are known are left out. */
+static void print_group(size_t group, const struct model *model)
+{
+    struct summary near = { 0 }, far = { 0 }, total = { 0 };
+    for (size_t i = 0; i < case_count; i++) {
+        const struct errors errors = errors_of(&cases[i], model);
+        if (group_of(&cases[i]) != group || !errors.is_known || !errors.has_rings)
+            continue;
+        for (int k = 0; k < RADIUS_COUNT; k++)
+            summary_add(ring_middle[k] <= 2.0 ? &near : &far, errors.rings[k]);
+        summary_add(&total, errors.r);
+        if (errors.has_t)
+            summary_add(&total, errors.t);
+    }
+    if (total.count == 0)
+        return;
+    printf("| %s |", model->name);
+    print_summary(&near);
+    print_summary(&far);
+    print_summary(&total);
+    printf("\n");
+}
+
+static void print_groups(void)
+{
+    for (size_t group = 0; group < COUNT(group_names); group++) {
         printf("\n| %s | rings at 0.5, 1, 2 ℓ | at 5, 10 ℓ | totals R and T |\n|---|---|---|---|\n",
-               group_names[g]);
-        for (size_t m = 0; m < COUNT(models); m++) {
-            const struct summary *const parts = summaries[g][m];
-            if (parts[TOTAL].count == 0)
-                continue;
-            printf("| %s |", models[m].name);
-            for (int part = 0; part < PART_COUNT; part++)
-                print_summary(&parts[part]);
-            printf("\n");
-        }
+               group_names[group]);
+        for (size_t m = 0; m < COUNT(models); m++)
+            print_group(group, &models[m]);
     }
 }
 
@@ -513,9 +542,10 @@ static bool draw(const char *path, const char *name, dipole_status *status)
             continue;
         dipole_stack *const stack = stack_of(&models[m], mc->layers, mc->layer_count);
         for (size_t i = 0; i < ring_count; i++) {
-            double noise;
+            const struct bin ring = ring_between(mc, edges[i], edges[i + 1]);
+            const double noise = 100.0 * ring.r_sem / ring.r;
             x[i] = sqrt(0.5 * (edges[i] * edges[i] + edges[i + 1] * edges[i + 1]));
-            y[m][i] = ring_error(mc, &models[m], stack, edges[i], edges[i + 1], &noise);
+            y[m][i] = ring_error(&ring, &models[m], stack);
             low[i] = -2.0 * noise;
             high[i] = 2.0 * noise;
         }
@@ -573,11 +603,9 @@ int main(int argc, char **argv)
     print_times("semi_hialb_n15");
     print_times("slab_hialb_n15_20mfp");
     print_times("layer3_skinR");
-    printf("\n### Monte Carlo, case by case\n");
-    print_cases();
-    printf("\n### Monte Carlo, in short\n\nMean of the absolute errors, and the largest error, in %%.\n");
-    print_summaries();
-    printf("\n### Adding and doubling, in short\n\nMean of the absolute errors, and the largest error, in "
+    printf("\n### Monte Carlo, in short\n\nMean of the absolute errors; the largest error, in %%.\n");
+    print_groups();
+    printf("\n### Adding and doubling, in short\n\nMean of the absolute errors; the largest error, in "
            "%%.\n");
     print_slab_summary("half-space, α' ≥ 0.9", HALF_SPACE, false);
     print_slab_summary("half-space, α' < 0.9", HALF_SPACE, true);
@@ -585,6 +613,8 @@ int main(int argc, char **argv)
     print_slab_summary("slab of ≥ 1 ℓ, α' < 0.9", THICK, true);
     print_slab_summary("slab of < 1 ℓ, α' ≥ 0.9", THIN, false);
     print_slab_summary("slab of < 1 ℓ, α' < 0.9", THIN, true);
+    printf("\n### Monte Carlo, case by case\n");
+    print_cases();
     printf("\n### Adding and doubling, case by case\n");
     print_slabs(true);
     print_slabs(false);
