@@ -1,14 +1,14 @@
 /*
  * Every model against the independent reference (tests/reference), and what an evaluation costs.
- * usage: bench_models REFERENCE [PLOT.png]; prints Markdown.
+ * usage: bench_models REFERENCE [PLOT.svg]; prints Markdown.
  */
-#include "bench/timing.h"
 #include "cli/cli.h"
 #include "io/file.h"
 #include "libdipole/dipole.h"
 #include "plot/plot.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
@@ -20,7 +20,7 @@ static const struct model {
     dipole_model model;
     dipole_fdr_kind fdr_kind;
     bool is_multiple_only; /* compared with light that was scattered more than once                    */
-    bool is_variant;       /* not drawn                                                                 */
+    bool is_variant;       /* not drawn, not timed       */
     const char *refusal;   /* why it cannot do some stacks; NULL where it can do all                    */
 } models[] = {
     { "dipole", DIPOLE_MODEL_DIPOLE, DIPOLE_FDR_EXACT, false, false, "half-space only" },
@@ -28,9 +28,10 @@ static const struct model {
       "half-space only" },
     { "better dipole", DIPOLE_MODEL_BETTER_DIPOLE, DIPOLE_FDR_EXACT, false, false, "half-space only" },
     { "the same, of R − R1", DIPOLE_MODEL_BETTER_DIPOLE, DIPOLE_FDR_EXACT, true, true, "half-space only" },
-    { "multipole", DIPOLE_MODEL_MULTIPOLE, DIPOLE_FDR_EXACT, false, true,
+    { "multipole", DIPOLE_MODEL_MULTIPOLE, DIPOLE_FDR_EXACT, false, false,
       "its source would leave a layer" },
     { "beam", DIPOLE_MODEL_BEAM, DIPOLE_FDR_EXACT, false, false, NULL },
+    { "modes", DIPOLE_MODEL_MODES, DIPOLE_FDR_EXACT, false, false, NULL },
 };
 
 enum { RADIUS_COUNT = 5, BIN_LIMIT = 1000, CASE_LIMIT = 32, SLAB_LIMIT = 256 };
@@ -333,10 +334,12 @@ static void summary_add(struct summary *summary, double error)
 
 static void print_summary(const struct summary *summary)
 {
-    if (summary->count > 0)
-        printf(" %.1f; %+.1f |", summary->sum / summary->count, summary->worst);
-    else
+    if (summary->count == 0) {
         printf(" |");
+        return;
+    }
+    printf(" %.1f;", summary->sum / summary->count);
+    print_error(summary->worst);
 }
 
 static const char *const group_names[] = { "half-spaces, α' > 0.9", "half-spaces, α' < 0.9", "slabs",
@@ -464,12 +467,13 @@ static void print_slabs(bool wants_half_space)
 
 /* ---- time ----------------------------------------------------------------------------------------- */
 
-enum { BATCH = 1024, SINGLES = 128 };
+enum { BATCH = 1024, SINGLES = 128, ROUND_COUNT = 41 };
 
 struct times {
     double create_us, batch_ns, single_ns;
 };
 
+/* Infinite where the model cannot do the case. */
 static struct times measure(const struct model *model, const struct monte_carlo *mc, const double *r_mm)
 {
     static double values[BATCH];
@@ -477,6 +481,8 @@ static struct times measure(const struct model *model, const struct monte_carlo 
     double start_s = cli_now_s();
     dipole_stack *const stack = stack_of(model, mc->layers, mc->layer_count);
     times.create_us = 1e6 * (cli_now_s() - start_s);
+    if (!stack)
+        return (struct times){ INFINITY, INFINITY, INFINITY };
     start_s = cli_now_s();
     dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, r_mm, BATCH, values);
     times.batch_ns = 1e9 * (cli_now_s() - start_s) / BATCH;
@@ -488,34 +494,30 @@ static struct times measure(const struct model *model, const struct monte_carlo 
     return times;
 }
 
+/* Shortest of all rounds; the models take turns. */
 static void print_times(const char *name)
 {
-    static double create_us[COUNT(models)][TIMING_ROUNDS], batch_ns[COUNT(models)][TIMING_ROUNDS],
-        single_ns[COUNT(models)][TIMING_ROUNDS];
+    struct times shortest[COUNT(models)];
     const struct monte_carlo *mc = cases;
     while (strcmp(mc->name, name) != 0)
         mc++;
     double r_mm[BATCH];
     for (int i = 0; i < BATCH; i++)
         r_mm[i] = mc->mean_free_path_mm * 0.05 * pow(400.0, (double)i / BATCH);
-    bool can[COUNT(models)];
-    for (size_t m = 0; m < COUNT(models); m++) {
-        dipole_stack *const stack = stack_of(&models[m], mc->layers, mc->layer_count);
-        can[m] = stack && !models[m].is_variant;
-        can[m] |= stack && models[m].model == DIPOLE_MODEL_MULTIPOLE;
-        dipole_stack_destroy(stack);
-    }
-    for (int i = 0; i < TIMING_ROUNDS; i++)
+    for (int i = 0; i < ROUND_COUNT; i++)
         for (size_t m = 0; m < COUNT(models); m++) {
-            const struct times t = can[m] ? measure(&models[m], mc, r_mm) : (struct times){ 0 };
-            create_us[m][i] = t.create_us;
-            batch_ns[m][i] = t.batch_ns;
-            single_ns[m][i] = t.single_ns;
+            if (models[m].is_variant)
+                continue;
+            const struct times t = measure(&models[m], mc, r_mm);
+            struct times *const s = &shortest[m];
+            *s = i == 0 ? t
+                        : (struct times){ fmin(s->create_us, t.create_us), fmin(s->batch_ns, t.batch_ns),
+                                          fmin(s->single_ns, t.single_ns) };
         }
     for (size_t m = 0; m < COUNT(models); m++)
-        if (can[m])
-            printf("| %s | %s | %.1f | %.0f | %.0f |\n", name, models[m].name, timing_median(create_us[m]),
-                   timing_median(batch_ns[m]), timing_median(single_ns[m]));
+        if (!models[m].is_variant && shortest[m].create_us < INFINITY)
+            printf("| %s | %s | %.0f | %.0f | %.0f |\n", name, models[m].name, shortest[m].create_us,
+                   shortest[m].batch_ns, shortest[m].single_ns);
 }
 
 /* ---- picture -------------------------------------------------------------------------------------- */
@@ -527,7 +529,7 @@ static bool draw(const char *path, const char *name, dipole_status *status)
 {
     static double x[PLOT_RINGS], y[COUNT(models)][PLOT_RINGS], low[PLOT_RINGS], high[PLOT_RINGS];
     struct plot_series series[COUNT(models) + 1];
-    size_t series_count = 0, ring_count = 0;
+    size_t series_count = 0, ring_count = 0, dash = 0;
     const struct monte_carlo *mc = cases;
     while (strcmp(mc->name, name) != 0)
         mc++;
@@ -538,7 +540,7 @@ static bool draw(const char *path, const char *name, dipole_status *status)
         ring_count++;
     }
     for (size_t m = 0; m < COUNT(models); m++) {
-        if (models[m].is_variant)
+        if (models[m].is_variant || models[m].model == DIPOLE_MODEL_MULTIPOLE) /* here the dipole */
             continue;
         dipole_stack *const stack = stack_of(&models[m], mc->layers, mc->layer_count);
         for (size_t i = 0; i < ring_count; i++) {
@@ -550,9 +552,11 @@ static bool draw(const char *path, const char *name, dipole_status *status)
             high[i] = 2.0 * noise;
         }
         dipole_stack_destroy(stack);
-        series[series_count++] = (struct plot_series){
-            .label = models[m].name, .count = ring_count, .x = x, .y = y[m], .dash = (enum plot_dash)(m % 4)
-        };
+        series[series_count++] = (struct plot_series){ .label = models[m].name,
+                                                       .count = ring_count,
+                                                       .x = x,
+                                                       .y = y[m],
+                                                       .dash = (enum plot_dash)(dash++ % 4) };
     }
     series[series_count++] = (struct plot_series){ .kind = PLOT_BAND,
                                                    .label = "Monte Carlo ± 2 standard errors",
@@ -573,12 +577,9 @@ static bool draw(const char *path, const char *name, dipole_status *status)
                                .marker_count = 1 };
     char *svg = NULL;
     size_t size;
-    unsigned char *png = NULL;
-    const bool is_done = plot_svg_create(&plot, &svg, &size, status) &&
-                         plot_png_create(svg, size, 1.0, &png, &size, status) &&
-                         io_file_write(path, png, size, status);
+    const bool is_done =
+        plot_svg_create(&plot, &svg, &size, status) && io_file_write(path, svg, size, status);
     free(svg);
-    free(png);
     return is_done;
 }
 
@@ -588,7 +589,7 @@ int main(int argc, char **argv)
 {
     dipole_status status;
     if (argc < 2 || argc > 3) {
-        fprintf(stderr, "usage: bench_models REFERENCE [PLOT.png]\n");
+        fprintf(stderr, "usage: bench_models REFERENCE [PLOT.svg]\n");
         return EXIT_USAGE;
     }
     read_monte_carlo(argv[1]);
