@@ -235,6 +235,8 @@ typedef enum dipole_model {
     DIPOLE_MODEL_BETTER_DIPOLE, /* d'Eon 2012; a half-space; T24                                     */
     DIPOLE_MODEL_MULTIPOLE,     /* Donner and Jensen 2005; layers thicker than one mean free path; T25 */
     DIPOLE_MODEL_BEAM,          /* extended source, partial-current boundary; any layers; T22, T23   */
+    DIPOLE_MODEL_MODES,         /* three exponential modes, surfaces by Fresnel (fdr_kind is ignored); any
+                                   layers; T29                                                       */
 } dipole_model;
 
 /* One layer, top first. thickness_mm: 1e-50 to 1e50, or INFINITY for the last (a half-space). */

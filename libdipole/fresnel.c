@@ -55,22 +55,23 @@ struct moments {
 };
 
 /*
- * Both moments for light going from the thin side to the dense side, x >= 1 their index ratio.
+ * Moments for light going from the thin side to the dense side, x >= 1 their index ratio, over the cosines
+ * on the thin side from sqrt(x^2 - 1) sinh(v_lo/2) to sqrt(x^2 - 1) sinh(v_hi/2).
  *
  * With s = -r_s, the amplitude of s-polarised light, the cosine obeys mu^2 = (x^2 - 1)(1 - s)^2/(4 s) and
  * everything is rational in s from s_0 = (x - 1)/(x + 1) at normal incidence to 1 at grazing. In v = -log s
  * the integrands are smooth on the scale of 1 and their nearest pole lies 2/(x^2 - 1) beyond v = 0, so
  * panels no longer than 1 and at least four of them bring 16 points to rounding for x up to 10.
- * step = x^2 - 1 and s_0 come from the caller, who knows them without cancellation.
+ * step = x^2 - 1 and the limits come from the caller, who knows them without cancellation.
  */
-static struct moments moments_thin_to_dense(double step, double s_0)
+static struct moments moments_between(double step, double v_lo, double v_hi)
 {
-    const double x2 = 1.0 + step, length = -log(s_0);
+    const double x2 = 1.0 + step, length = v_hi - v_lo;
     const int panel_count = (int)fmax(4.0, ceil(length));
     const double half = 0.5 * length / panel_count;
     struct moments sum = { 0.0, 0.0, 0.0, 0.0 };
     for (int panel = 0; panel < panel_count; panel++) {
-        const double middle = (2 * panel + 1) * half;
+        const double middle = v_lo + (2 * panel + 1) * half;
         for (int node = 0; node < 16; node++) {
             const double *const rule = legendre[node / 2];
             const double v = middle + (node % 2 == 0 ? half : -half) * rule[0];
@@ -90,6 +91,12 @@ static struct moments moments_thin_to_dense(double step, double s_0)
         }
     }
     return sum;
+}
+
+/* All cosines: s from s_0 = (x - 1)/(x + 1) to 1. */
+static struct moments moments_thin_to_dense(double step, double s_0)
+{
+    return moments_between(step, 0.0, -log(s_0));
 }
 
 static bool eta_is_legal(double eta)
@@ -138,6 +145,42 @@ double dipole_fresnel_second_moment_inside(double eta)
         return 0.5 * moments.thin;
     const double critical = sqrt((eta - 1.0) * (eta + 1.0)) / eta;
     return 0.5 * moments.dense + critical * critical * critical / 3.0;
+}
+
+/* Over a range of squared cosines on the thin side; the whole range as moments_thin_to_dense(). */
+static struct moments moments_of_range(double step, double cosine2_lo, double cosine2_hi)
+{
+    return moments_between(step, 2.0 * asinh(sqrt(cosine2_lo / step)),
+                           2.0 * asinh(sqrt(cosine2_hi / step)));
+}
+
+void dipole_fresnel_mean_inside(double eta, double cosine2_lo, double cosine2_hi, double *reflected,
+                                double *transmitted)
+{
+    *reflected = 0.0;
+    *transmitted = 1.0;
+    if (eta == 1.0)
+        return;
+    const double width = cosine2_hi - cosine2_lo;
+    if (eta < 1.0) {
+        const double step = (1.0 - eta) * (1.0 + eta) / (eta * eta);
+        const struct moments moments = moments_of_range(step, cosine2_lo, cosine2_hi);
+        *reflected = moments.reflected / width;
+        *transmitted = moments.transmitted / width;
+        return;
+    }
+    /* mu on the dense side becomes sqrt(1 - eta^2 (1 - mu^2)) on the thin side; below the critical cosine
+     * all is reflected */
+    const double step = (eta - 1.0) * (eta + 1.0), eta2 = eta * eta, critical2 = step / eta2;
+    *reflected = (fmin(cosine2_hi, critical2) - fmin(cosine2_lo, critical2)) / width;
+    *transmitted = 0.0;
+    const double thin_lo = fmax(1.0 - eta2 * (1.0 - cosine2_lo), 0.0),
+                 thin_hi = fmax(1.0 - eta2 * (1.0 - cosine2_hi), 0.0);
+    if (thin_hi > thin_lo) {
+        const struct moments moments = moments_of_range(step, thin_lo, thin_hi);
+        *reflected += moments.reflected / (eta2 * width);
+        *transmitted += moments.transmitted / (eta2 * width);
+    }
 }
 
 /* ---- the fit (T3) --------------------------------------------------------------------------------- */

@@ -40,6 +40,10 @@ double dipole_find_root(falling_function *function, const void *context, double 
 
 /* C_2 = int_0^1 F(mu) mu^2 dmu for light inside (fresnel.c). T24 */
 double dipole_fresnel_second_moment_inside(double eta);
+/* Means of F and 1 - F over a range of squared cosines, for light inside; neither is 1 less the other. T29
+ */
+void dipole_fresnel_mean_inside(double eta, double cosine2_lo, double cosine2_hi, double *reflected,
+                                double *transmitted);
 
 /* ---- one spatial frequency of a stack (layers.c) -------------------------------------------------- */
 
@@ -52,6 +56,30 @@ struct slab {
     struct dual near_moments[SLAB_MOMENTS], far_moments[SLAB_MOMENTS]; /* of the fading beam            */
 };
 
+/* The modes of a layer (modes.c). T29 */
+enum { MODE_COUNT = 3 };
+
+struct matrix {
+    struct dual at[MODE_COUNT][MODE_COUNT]; /* row, column */
+};
+
+struct mode_layer {
+    struct dual q2[MODE_COUNT];     /* q^2 of each at k = 0, ascending       */
+    struct matrix basis;            /* column j: what mode j is in the psi_m */
+    struct dual source[MODE_COUNT]; /* of each, for one unit of beam         */
+};
+
+enum { MODE_FACE_NODES = 16 };
+
+/* F_m(0), 1 - F_m(0), and what F_m(k) needs. T29 */
+struct mode_face {
+    double reflected[MODE_COUNT], transmitted[MODE_COUNT];
+    double share[MODE_COUNT]; /* g_m F_m(0)/S(0)                                     */
+    struct dual sigma_per_mm; /* the unit of k                                       */
+    size_t node_count;        /* of E; 0 where nothing is reflected                  */
+    double from_normal[MODE_FACE_NODES], weight[MODE_FACE_NODES]; /* 1 - mu; over E(0) */
+};
+
 struct system {
     struct slab slabs[DIPOLE_LAYER_LIMIT];
     double eta[DIPOLE_LAYER_LIMIT];
@@ -59,21 +87,45 @@ struct system {
     size_t count;
     bool is_half_space;
     struct dual unscattered[2]; /* of the beam, by dipole_face */
+    double multipole_a[DIPOLE_LAYER_LIMIT][2]; /* A of both faces of each layer (models.c). T25 */
+    struct mode_layer mode_layers[DIPOLE_LAYER_LIMIT];
+    struct mode_face mode_faces[2]; /* by dipole_face */
 };
 
 /* parameter: 3 * layer + 0, 1, 2 for d/d log sigma_a, sigma_s', thickness; negative for none. */
 void dipole_system_init(struct system *system, const dipole_layer *layers,
                         const dipole_coefficients *coefficients, size_t count, int parameter);
+
+/*
+ * One finite layer at one frequency, x measured from the side the integral runs to, d - x from the other:
+ * cosh qd and (sinh qd)/q; the integrals over the layer of the near beam, e^(-sigma_t' x), and of the far
+ * beam, e^(-sigma_t' (d - x)), times cosh q(d - x) and (sinh q(d - x))/q. All times `unit`, which is 1 or,
+ * in thick layers, e^(-qd).
+ */
+struct crossing {
+    struct dual unit, cosh, sinh, near_cosh, near_sinh, far_cosh, far_sinh, q2;
+};
+
+struct crossing dipole_slab_cross(const struct slab *slab, struct dual q2);
+
 /* R^ and T^ at k^2, complex, by dipole_face: the beam model. T23 */
 void dipole_system_solve(const struct system *system, double complex k2, struct dual out[2]);
 /* The smallest kappa where R^ and T^ are singular at k^2 = -kappa^2; sigma_tr of the base at most. */
 double dipole_system_first_singularity_per_mm(const struct system *system);
+
+/* ---- exponential modes (modes.c) ------------------------------------------------------------------ */
+
+/* What a system needs besides, its own parameter's derivatives included. T29 */
+void dipole_modes_init(struct system *system);
+void dipole_modes_solve(const struct system *system, double complex k2, struct dual out[2]);
+double dipole_modes_first_singularity_per_mm(const struct system *system);
 
 /* ---- the papers' models at one spatial frequency (models.c) --------------------------------------- */
 
 /* d'Eon's better dipole; a half-space. T24 */
 void dipole_better_dipole_solve(const struct system *system, double complex k2, struct dual out[2]);
 /* Donner and Jensen's multipole and their combination of layers. T25 */
+void dipole_multipole_init(struct system *system);
 void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2]);
 double dipole_multipole_first_singularity_per_mm(const struct system *system);
 

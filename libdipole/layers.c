@@ -108,16 +108,6 @@ void dipole_system_init(struct system *system, const dipole_layer *layers,
 
 /* ---- one spatial frequency ------------------------------------------------------------------------ */
 
-/*
- * One finite layer at one frequency, x measured from the side the integral runs to, d - x from the other:
- * cosh qd and (sinh qd)/q; the integrals over the layer of the near beam, e^(-sigma_t' x), and of the far
- * beam, e^(-sigma_t' (d - x)), times cosh q(d - x) and (sinh q(d - x))/q. All times `unit`, which is 1 or,
- * in thick layers, e^(-qd).
- */
-struct crossing {
-    struct dual unit, cosh, sinh, near_cosh, near_sinh, far_cosh, far_sinh, q2;
-};
-
 /* sum_n x^n series[stride n + first], for |x| < 1/4 to rounding if the terms fall as 1/(2n)!. */
 static struct dual power_series(const struct dual *series, int first, struct dual x)
 {
@@ -189,9 +179,8 @@ static struct crossing cross_thick(const struct slab *slab, struct dual q2)
     return out;
 }
 
-static struct crossing cross(const struct slab *slab, double complex k2)
+struct crossing dipole_slab_cross(const struct slab *slab, struct dual q2)
 {
-    const struct dual q2 = { slab->sigma_tr2.v + k2, slab->sigma_tr2.d };
     return size(q2.v) * square(creal(slab->thickness.v)) < 0.25 ? cross_thin(slab, q2)
                                                                 : cross_thick(slab, q2);
 }
@@ -224,7 +213,8 @@ void dipole_system_solve(const struct system *system, double complex k2, struct 
             y = multiply(slab->diffusion, q);
             c = divide(multiply(slab->sigma_s_prime, slab->down), add(q, slab->sigma_t_prime));
         } else {
-            crossings[i] = cross(slab, k2);
+            crossings[i] =
+                dipole_slab_cross(slab, (struct dual){ slab->sigma_tr2.v + k2, slab->sigma_tr2.d });
             pass(slab, &crossings[i], slab->down, slab->up, &y, &c);
         }
         if (i > 0) /* phi/n^2 is continuous: the layer above sees y (n_below/n_above)^2 */

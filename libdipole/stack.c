@@ -15,6 +15,7 @@ typedef void response_function(const struct system *system, double complex k2, s
 struct dipole_stack {
     size_t count;
     dipole_side side;
+    dipole_model model;
     dipole_layer layers[DIPOLE_LAYER_LIMIT]; /* in the order in which the light meets them */
     dipole_coefficients coefficients[DIPOLE_LAYER_LIMIT];
     response_function *response;
@@ -65,20 +66,21 @@ static bool model_check(const dipole_stack *stack, dipole_model model, dipole_st
     const bool is_half_space = stack->count == 1 && isinf(stack->layers[0].thickness_mm);
     switch (model) {
     case DIPOLE_MODEL_BEAM:
+    case DIPOLE_MODEL_MODES:
         return true;
     case DIPOLE_MODEL_DIPOLE:
     case DIPOLE_MODEL_BETTER_DIPOLE:
-        return is_half_space ||
-               dipole_fail(
-                   status, DIPOLE_NOT_SUPPORTED, NULL,
-                   "this model knows only a half-space, expected \"beam\" or \"multipole\" for layers");
+        return is_half_space || dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL,
+                                            "this model knows only a half-space, expected \"beam\", "
+                                            "\"modes\" or \"multipole\" for layers");
     case DIPOLE_MODEL_MULTIPOLE:
         for (size_t i = 0; i < stack->count; i++)
             if (!(stack->layers[i].thickness_mm > stack->coefficients[i].mean_free_path_mm))
                 return dipole_fail(
                     status, DIPOLE_NOT_SUPPORTED, NULL,
                     "layers[%zu] is %g mm thick, and the source of the multipole lies %g mm deep, "
-                    "below it; expected a thicker layer, or the model \"beam\", which has no limit",
+                    "below it; expected a thicker layer, or the model \"beam\" or \"modes\", which have no "
+                    "limit",
                     place(stack, i), stack->layers[i].thickness_mm,
                     stack->coefficients[i].mean_free_path_mm);
         return true;
@@ -98,23 +100,37 @@ static bool coefficients_fill(dipole_stack *stack, dipole_status *status)
     return true;
 }
 
+/* What the model's response is computed from; parameter as in dipole_system_init(). */
+static void system_init(const dipole_stack *stack, int parameter, struct system *system)
+{
+    dipole_system_init(system, stack->layers, stack->coefficients, stack->count, parameter);
+    if (stack->model == DIPOLE_MODEL_MODES)
+        dipole_modes_init(system);
+    if (stack->model == DIPOLE_MODEL_MULTIPOLE)
+        dipole_multipole_init(system);
+}
+
 /* sigma_tr of the last layer as the model has it. */
-static double base_sigma_tr_per_mm(const dipole_stack *stack, dipole_model model)
+static double base_sigma_tr_per_mm(const dipole_stack *stack)
 {
     const dipole_coefficients *const c = &stack->coefficients[stack->count - 1];
+    if (stack->model == DIPOLE_MODEL_MODES)
+        return sqrt(creal(stack->system.mode_layers[stack->count - 1].q2[0].v));
     const double grosjean = 3.0 * c->sigma_a_per_mm / (c->sigma_t_prime_per_mm + c->sigma_a_per_mm);
-    return model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
-                                               : c->sigma_tr_per_mm;
+    return stack->model == DIPOLE_MODEL_BETTER_DIPOLE ? c->sigma_t_prime_per_mm * sqrt(grosjean)
+                                                      : c->sigma_tr_per_mm;
 }
 
 /* Where R^ and T^ begin to be singular. */
-static double singularity_per_mm(const dipole_stack *stack, dipole_model model)
+static double singularity_per_mm(const dipole_stack *stack)
 {
-    if (model == DIPOLE_MODEL_BEAM)
+    if (stack->model == DIPOLE_MODEL_BEAM)
         return dipole_system_first_singularity_per_mm(&stack->system);
-    if (model == DIPOLE_MODEL_MULTIPOLE)
+    if (stack->model == DIPOLE_MODEL_MODES)
+        return dipole_modes_first_singularity_per_mm(&stack->system);
+    if (stack->model == DIPOLE_MODEL_MULTIPOLE)
         return dipole_multipole_first_singularity_per_mm(&stack->system);
-    return base_sigma_tr_per_mm(stack, model);
+    return base_sigma_tr_per_mm(stack);
 }
 
 static double shortest_length_mm(const dipole_stack *stack)
@@ -125,14 +141,14 @@ static double shortest_length_mm(const dipole_stack *stack)
     return shortest;
 }
 
-static void totals_fill(dipole_stack *stack, dipole_model model)
+static void totals_fill(dipole_stack *stack)
 {
+    const bool has_beam = stack->model == DIPOLE_MODEL_BEAM || stack->model == DIPOLE_MODEL_MODES;
     struct dual totals[2];
     stack->response(&stack->system, 0.0, totals);
     for (int face = 0; face < 2; face++) {
         stack->total[face] = creal(totals[face].v);
-        stack->unscattered[face] =
-            model == DIPOLE_MODEL_BEAM ? creal(stack->system.unscattered[face].v) : 0.0;
+        stack->unscattered[face] = has_beam ? creal(stack->system.unscattered[face].v) : 0.0;
     }
 }
 
@@ -153,20 +169,20 @@ static double complex response_far(const void *context, double complex k2)
 }
 
 /* Everything but a row of sources: lay out and fill the contours of both faces. */
-static bool hankels_init(dipole_stack *stack, dipole_model model)
+static bool hankels_init(dipole_stack *stack)
 {
     static hankel_function *const responses[2] = { response_lit, response_far };
     const size_t last = stack->count - 1;
     const bool is_half_space = isinf(stack->layers[last].thickness_mm);
     struct hankel_input input = {
         .context = stack,
-        .singularity_per_mm = singularity_per_mm(stack, model),
+        .singularity_per_mm = singularity_per_mm(stack),
         .r_min_mm = stack->r_floor_mm,
         .extent_mm = is_half_space ? stack->coefficients[last].mean_free_path_mm : 0.0,
     };
     for (size_t i = 0; i < stack->count; i++)
         input.extent_mm += i < last || !is_half_space ? stack->layers[i].thickness_mm : 0.0;
-    input.is_cut = is_half_space && input.singularity_per_mm == base_sigma_tr_per_mm(stack, model);
+    input.is_cut = is_half_space && input.singularity_per_mm == base_sigma_tr_per_mm(stack);
     for (int face = 0; face < 2; face++) {
         input.response = responses[face];
         if (!dipole_hankel_init(&stack->hankel[face], &input))
@@ -200,7 +216,7 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
     *stack_out = NULL;
     if (!layers_check(layers, count, side, status))
         return false;
-    dipole_stack draft = { .count = count, .side = side };
+    dipole_stack draft = { .count = count, .side = side, .model = model };
     for (size_t i = 0; i < count; i++)
         draft.layers[i] = layers[place(&draft, i)];
     if (!coefficients_fill(&draft, status) || !model_check(&draft, model, status))
@@ -210,16 +226,17 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
         [DIPOLE_MODEL_BETTER_DIPOLE] = dipole_better_dipole_solve,
         [DIPOLE_MODEL_MULTIPOLE] = dipole_multipole_solve,
         [DIPOLE_MODEL_BEAM] = dipole_system_solve,
+        [DIPOLE_MODEL_MODES] = dipole_modes_solve,
     };
     draft.response = responses[model];
-    dipole_system_init(&draft.system, draft.layers, draft.coefficients, count, -1);
-    totals_fill(&draft, model);
+    system_init(&draft, -1, &draft.system);
+    totals_fill(&draft);
 
     draft.r_floor_mm = 1e-9 * shortest_length_mm(&draft);
     const bool is_half_space = count == 1 && isinf(layers[0].thickness_mm);
     if (is_half_space && model == DIPOLE_MODEL_BEAM)
         draft.row.count = dipole_row_beam_count(&draft.coefficients[0]);
-    else if (is_half_space && model != DIPOLE_MODEL_BETTER_DIPOLE)
+    else if (is_half_space && (model == DIPOLE_MODEL_DIPOLE || model == DIPOLE_MODEL_MULTIPOLE))
         draft.row.count = 2;
 
     dipole_stack *const stack = malloc(sizeof *stack + 3 * draft.row.count * sizeof(double));
@@ -228,7 +245,7 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
     *stack = draft;
     if (stack->row.count > 0) {
         row_fill(stack, (double *)(stack + 1));
-    } else if (!hankels_init(stack, model)) {
+    } else if (!hankels_init(stack)) {
         dipole_stack_destroy(stack);
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu layers", count);
     }
@@ -495,8 +512,7 @@ dipole_stack_gradient dipole_stack_total_gradient(const dipole_stack *stack, dip
     for (int parameter = 0; parameter < 3; parameter++) {
         struct system system;
         struct dual f[2];
-        dipole_system_init(&system, stack->layers, stack->coefficients, stack->count,
-                           3 * (int)place(stack, layer) + parameter);
+        system_init(stack, 3 * (int)place(stack, layer) + parameter, &system);
         stack->response(&system, 0.0, f);
         gradient_set(&gradient, parameter, creal(f[face].d));
     }
@@ -555,8 +571,7 @@ void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_face face, 
         return;
     struct system systems[3];
     for (int parameter = 0; parameter < 3; parameter++)
-        dipole_system_init(&systems[parameter], stack->layers, stack->coefficients, stack->count,
-                           3 * (int)place(stack, layer) + parameter);
+        system_init(stack, 3 * (int)place(stack, layer) + parameter, &systems[parameter]);
     const struct hankel *const hankel = &stack->hankel[face];
     for (size_t i = 0; i < hankel->contour_count; i++)
         contour_gradient(stack, systems, face, &hankel->contours[i], r_mm, count, gradients);
