@@ -428,9 +428,10 @@ static double root_find(falling_log *f, const struct question *question, double 
         stride *= 2.0;
         a += stride, f_a = f(question, a);
     }
-    double c = a, f_c = f_a, share = 0.5;
+    double share = 0.5;
     for (;;) {
         const double x = a + share * (b - a), f_x = f(question, x);
+        double c, f_c; /* what was a or b before */
         if ((f_x > 0.0) == (f_a > 0.0)) {
             c = a, f_c = f_a;
         } else {
