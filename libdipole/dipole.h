@@ -285,7 +285,7 @@ DIPOLE_API double dipole_stack_spectrum(const dipole_stack *stack, dipole_face f
  * Profile: power leaving per mm^2 at each of count radii, for one unit of power entering, in 1/mm^2.
  *
  *   r_mm     distances, >= 0; values is count doubles, NaN where r_mm is negative or NaN
- *   Of layers the error is below 1e-11 of the value at r = 0 (T26), of a half-space below 8 units in the
+ *   Of layers the error is below 1e-10 of the value at r = 0 (T26), of a half-space below 8 units in the
  * last place (T5, T22). The beam model has an integrable logarithm at r = 0: below 1e-9 of the shortest
  * mean free path the value there is continued.
  */

@@ -390,8 +390,9 @@ double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face fac
         const double area_mm2 = PI * (r_hi_mm - r_lo_mm) * (r_hi_mm + r_lo_mm);
         const double within = dipole_stack_within(stack, face, r_hi_mm);
         if (2.0 * within < stack->total[face])
-            return (within - dipole_stack_within(stack, face, r_lo_mm)) / area_mm2;
-        return (dipole_stack_beyond(stack, face, r_lo_mm) - dipole_stack_beyond(stack, face, r_hi_mm)) /
+            return fmax(0.0, within - dipole_stack_within(stack, face, r_lo_mm)) / area_mm2;
+        return fmax(0.0,
+                    dipole_stack_beyond(stack, face, r_lo_mm) - dipole_stack_beyond(stack, face, r_hi_mm)) /
                area_mm2;
     }
     double sum = 0.0;

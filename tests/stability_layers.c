@@ -40,8 +40,7 @@ static void check_face(const dipole_stack *stack, dipole_face face, struct rng *
             within < last_within * (1.0 - 1e-9) - 1e-13 * total - least)
             failed("stack %d, face %d, r %.17g: within %.17g after %.17g, beyond %.17g", number, (int)face,
                    r, within, last_within, beyond);
-        if (!isfinite(ring) || (r >= floor_mm && ring > value * (1.0 + 1e-9) + 1e-12 * top + least) ||
-            ring < -1e-12 * top)
+        if (!is_sound(ring) || (r >= floor_mm && ring > value * (1.0 + 1e-9) + 1e-12 * top + least))
             failed("stack %d, face %d, r %.17g: ring mean %.17g, inner edge %.17g, outer %.17g", number,
                    (int)face, r, ring, value, profile(stack, face, 1.5 * r));
         last = value, last_within = within;
