@@ -605,6 +605,8 @@ static void bad_stacks_are_refused(void **state)
         { many, 17, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE, "17 layers, expected 1 to 16" },
         { negative, 2, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
           "layers[0].sigma_s_prime_per_mm is -1, expected >= 0 (0, or 1e-50 to 1e+50)" },
+        { negative, 1, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "sigma_s_prime_per_mm is -1, expected >= 0 (0, or 1e-50 to 1e+50)" },
         { inside, 2, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
           "layers[0].thickness_mm is inf, expected > 0 (1e-50 to 1e+50)" },
         { &nothing, 1, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
