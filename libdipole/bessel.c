@@ -47,19 +47,6 @@ static double complex bessel_large(double complex z, double complex log_z, const
     return cexp(log_sqrt_half_pi - z - 0.5 * log_z) * (re + I * im);
 }
 
-/* sum_k coefficients[k] y^k, 12 terms. */
-static inline double complex polynomial(const double *coefficients, double complex y)
-{
-    const double a = creal(y), b = cimag(y);
-    double re = coefficients[11], im = 0.0;
-    for (int k = 10; k >= 0; k--) {
-        const double next = re * a - im * b + coefficients[k];
-        im = re * b + im * a;
-        re = next;
-    }
-    return re + I * im;
-}
-
 /*
  * The ascending series for |z| < 2, where they lose one digit at most. With y = z^2/4 and L = log(z/2) +
  * gamma, K_0 = sum y^k (H_k - L)/(k!)^2,   1 - z K_1 = 2y sum y^k (H_k + 1/(2k + 2) - L)/(k! (k + 1)!).

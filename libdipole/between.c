@@ -68,7 +68,8 @@ size_t dipole_sources_init(const dipole_coefficients *c, dipole_model model, dou
  * makes the hypotenuse d. */
 static double source_lobe(const dipole_coefficients *c, double depth_mm, double d2_mm2)
 {
-    const double z = fabs(depth_mm), r = sqrt(fmax(d2_mm2 - z * z, 0.0));
+    const double z = fabs(depth_mm), r2 = d2_mm2 - z * z;
+    const double r = sqrt(r2 < 0.0 ? 0.0 : r2); /* NaN stays NaN */
     const struct dd sigma_tr = { c->sigma_tr_per_mm, c->sigma_tr_low_per_mm };
     const double distance = lobe_distance(r);
     return lobe_value((struct dd){ z, 0.0 }, sigma_tr, distance, lobe_square(distance));

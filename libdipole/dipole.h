@@ -374,7 +374,8 @@ DIPOLE_API double dipole_rd_between_per_mm2(const dipole_coefficients *coefficie
  *   diffuse_mean_free_path_mm  1/sigma_tr, 1e-50 to 1e50: the other length that is called a "radius"
  *
  * The reflectance of *out is the one given to 1e-12, and so is what would be absorbed. Fails with
- * DIPOLE_BAD_VALUE, or DIPOLE_NOT_SUPPORTED for other models; *out is then untouched.
+ * DIPOLE_BAD_VALUE, also where a coefficient of the medium would leave its legal range, or with
+ * DIPOLE_NOT_SUPPORTED for other models; *out is then untouched.
  */
 DIPOLE_API DIPOLE_CHECKED bool dipole_medium_from_mean_free_path(double diffuse_reflectance,
                                                                  double mean_free_path_mm, double eta,

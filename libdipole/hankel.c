@@ -62,6 +62,8 @@ static double cut_end(const struct hankel_input *input)
     if (!input->is_cut || input->singularity_per_mm > 0.1 * highest)
         return 0.0;
     const double lowest = 1e-3 * highest, slope = cut_density(input, lowest) / lowest;
+    if (slope == 0.0) /* a layer that lets nothing through hides the base */
+        return 0.0;
     double end = 0.0;
     for (double q = 2.0 * lowest; q <= highest; q *= 2.0) {
         if (!(fabs(cut_density(input, q) / q - slope) <= 1e-3 * slope))
@@ -154,7 +156,7 @@ static bool node_append(struct hankel *hankel, const struct hankel_node *node)
 static bool contour_fill(struct hankel *hankel, const struct hankel_input *input,
                          struct hankel_contour *contour)
 {
-    const bool is_first = contour == hankel->contours, is_cut = contour->angle == 0.0;
+    const bool is_cut = contour->angle == 0.0;
     contour->first = hankel->node_count;
     double largest = 0.0, largest_term = 0.0;
     for (size_t i = 0;; i++) {
@@ -174,7 +176,7 @@ static bool contour_fill(struct hankel *hankel, const struct hankel_input *input
             size(node.term) * exp(-(creal(kappa) - contour->vertex) * contour->r_from_mm);
         largest = fmax(largest, reached);
         largest_term = fmax(largest_term, size(node.term));
-        if (!(reached >= 1e-20 * largest) || (is_first && size(kappa) * input->r_min_mm > 1e7))
+        if (!(reached >= 1e-20 * largest) || size(kappa) * input->r_min_mm > 1e7)
             break;
         if (!node_append(hankel, &node))
             return false;

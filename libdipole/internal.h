@@ -87,6 +87,7 @@ struct system {
     size_t count;
     bool is_half_space;
     struct dual unscattered[2]; /* of the beam, by dipole_face */
+    double multipole_a[DIPOLE_LAYER_LIMIT][2]; /* A of both faces of each layer (models.c). T25 */
     struct mode_layer mode_layers[DIPOLE_LAYER_LIMIT];
     struct mode_face mode_faces[2]; /* by dipole_face */
 };
@@ -124,6 +125,7 @@ double dipole_modes_first_singularity_per_mm(const struct system *system);
 /* d'Eon's better dipole; a half-space. T24 */
 void dipole_better_dipole_solve(const struct system *system, double complex k2, struct dual out[2]);
 /* Donner and Jensen's multipole and their combination of layers. T25 */
+void dipole_multipole_init(struct system *system);
 void dipole_multipole_solve(const struct system *system, double complex k2, struct dual out[2]);
 double dipole_multipole_first_singularity_per_mm(const struct system *system);
 

@@ -74,6 +74,16 @@ static double face_a(double eta, double eta_beyond)
     return (1.0 + dipole_fdr_exact(ratio)) / dipole_fdt_exact(ratio);
 }
 
+void dipole_multipole_init(struct system *system)
+{
+    for (size_t i = 0; i < system->count; i++) {
+        const double above = i > 0 ? system->eta[i - 1] : 1.0,
+                     below = i + 1 < system->count ? system->eta[i + 1] : 1.0;
+        system->multipole_a[i][0] = face_a(system->eta[i], above);
+        system->multipole_a[i][1] = face_a(system->eta[i], below);
+    }
+}
+
 /* Light that enters a layer from above or below spreads as if a beam had entered it, per frequency:
  * R_12 = R_1 + T_1 R_2 T_1'/(1 - R_1' R_2), T_12 = T_1 T_2/(1 - R_1' R_2). Joined from the bottom upwards.
  * Returns the smallest real part of 1 - R_1' R_2.
@@ -88,8 +98,7 @@ static double multipole_solve(const struct system *system, double complex k2, st
         struct dual q2 = slab->sigma_tr2;
         q2.v += k2;
         const struct dual q = root(q2);
-        const double a_0 = face_a(system->eta[i], i > 0 ? system->eta[i - 1] : 1.0);
-        const double a_1 = face_a(system->eta[i], i + 1 < count ? system->eta[i + 1] : 1.0);
+        const double a_0 = system->multipole_a[i][0], a_1 = system->multipole_a[i][1];
         const struct dual z_0 = scale(2.0 * a_0, slab->diffusion), z_1 = scale(2.0 * a_1, slab->diffusion);
         if (i + 1 == count && system->is_half_space) {
             r_below = base_reflectance(slab, q, z_0);
@@ -123,8 +132,7 @@ double dipole_multipole_first_singularity_per_mm(const struct system *system)
     for (size_t i = 0; i < count; i++) {
         const struct slab *const slab = &system->slabs[i];
         const double sigma_tr = sqrt(creal(slab->sigma_tr2.v));
-        const double a_0 = face_a(system->eta[i], i > 0 ? system->eta[i - 1] : 1.0);
-        const double a_1 = face_a(system->eta[i], i + 1 < count ? system->eta[i + 1] : 1.0);
+        const double a_0 = system->multipole_a[i][0], a_1 = system->multipole_a[i][1];
         const double all = creal(slab->thickness.v) + 2.0 * (a_0 + a_1) * creal(slab->diffusion.v);
         const bool is_base = i + 1 == count && system->is_half_space;
         lo = fmin(lo, sigma_tr);

@@ -279,35 +279,37 @@ void dipole_modes_init(struct system *system)
 /* ---- one spatial frequency: a face ---------------------------------------------------------------- */
 
 /*
- * Z_m = s_m (1 - F_m)/(1 + F_m). F_m = F_m(0) rho, rho = [E(k)/E(0)] [S(0)/S(k)], where E is what the face
- * reflects of light scattered once, which is known exactly, and S the same by modes with F_m(0):
- *   E = int_0^1 F(mu) mu/sqrt((1 + mu)^2 + k^2 (1 - mu^2)) dmu,   S = sum g_m F_m(0)/(sqrt(t_m^2 + k^2) +
- * 1) 1 - rho comes from sums of differences to k = 0, which do not cancel.
+ * Z_m = s_m (1 - F_m)/(1 + F_m), F_m = F_m(0) rho. rho = [E(k)/E(0)] [S(0)/S(k)], where E is what the face
+ * reflects of light scattered once, which is known exactly, and S is the same by modes with F_m(0):
+ *   E = int_0^1 F mu/sqrt((1 + mu)^2 + k^2 (1 - mu^2)) dmu,   S = sum g_m F_m(0)/(sqrt(t_m^2 + k^2) + 1).
+ * Up to k = 10, 1 - rho comes from what E and S lack of what they are at k = 0, which does not cancel.
  */
+static struct dual rho_lack(const struct mode_face *face, double complex k2)
+{
+    const struct dual unit = divide(constant(1.0), face->sigma_per_mm), unit2 = multiply(unit, unit);
+    const struct dual kk = { unit2.v * k2, unit2.d * k2 };
+    struct dual e = constant(0.0), e_lost = constant(0.0), s = constant(0.0), s_lost = constant(0.0);
+    for (size_t i = 0; i < face->node_count; i++) {
+        const double a = 2.0 - face->from_normal[i], b = face->from_normal[i] * a;
+        const struct dual r = root(add(constant(a * a), scale(b, kk)));
+        const struct dual part = divide(constant(face->weight[i]), r);
+        e = add(e, part);
+        e_lost = add(e_lost, divide(scale(b / a, part), add(r, constant(a))));
+    }
+    for (int m = 0; m < N; m++) {
+        const struct dual r = root(add(constant(rate2[m]), kk));
+        const struct dual part = divide(constant(face->share[m]), add(r, constant(1.0)));
+        s = add(s, part);
+        s_lost = add(s_lost, divide(scale(1.0 / (rate[m] + 1.0), part), add(r, constant(rate[m]))));
+    }
+    return size(kk.v) > 100.0 ? subtract(constant(1.0), divide(e, s))
+                              : divide(multiply(kk, subtract(e_lost, s_lost)), s);
+}
+
 static void face_admittance(const struct mode_face *face, double complex k2, const struct dual s[N],
                             struct dual z[N])
 {
-    struct dual lack = constant(0.0); /* 1 - rho */
-    if (face->node_count > 0) {
-        const struct dual unit = divide(constant(1.0), face->sigma_per_mm);
-        struct dual kk = multiply(unit, unit);
-        kk = (struct dual){ kk.v * k2, kk.d * k2 };
-        struct dual e_lost = constant(0.0), modes = constant(0.0), modes_lost = constant(0.0);
-        for (size_t i = 0; i < face->node_count; i++) {
-            const double a = 2.0 - face->from_normal[i], b = face->from_normal[i] * a;
-            const struct dual r = root(add(constant(a * a), scale(b, kk)));
-            e_lost =
-                add(e_lost, divide(constant(face->weight[i] * b / a), multiply(r, add(r, constant(a)))));
-        }
-        for (int m = 0; m < N; m++) {
-            const struct dual r = root(add(constant(rate2[m]), kk));
-            const struct dual mode = divide(constant(face->share[m]), add(r, constant(1.0)));
-            modes = add(modes, mode);
-            modes_lost =
-                add(modes_lost, divide(scale(1.0 / (rate[m] + 1.0), mode), add(r, constant(rate[m]))));
-        }
-        lack = divide(multiply(kk, subtract(e_lost, modes_lost)), modes);
-    }
+    const struct dual lack = face->node_count > 0 ? rho_lack(face, k2) : constant(0.0);
     for (int m = 0; m < N; m++) {
         const struct dual less = scale(face->reflected[m], lack);
         z[m] = multiply(s[m], divide(add(constant(face->transmitted[m]), less),

@@ -46,11 +46,6 @@ static bool layers_check(const dipole_layer *layers, size_t count, dipole_side s
             return dipole_fail(
                 status, DIPOLE_BAD_VALUE, NULL, "layers[%zu].thickness_mm is %g, expected > 0 (%g to %g%s)",
                 i, d, DIPOLE_THICKNESS_MIN_MM, DIPOLE_THICKNESS_MAX_MM, is_last ? ", or infinite" : "");
-        const double ratio = i > 0 ? layers[i].medium.eta / layers[i - 1].medium.eta : 1.0;
-        if (ratio < DIPOLE_ETA_MIN || ratio > DIPOLE_ETA_MAX)
-            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
-                               "layers[%zu].eta is %g times that of the layer above, expected %g to %g", i,
-                               ratio, DIPOLE_ETA_MIN, DIPOLE_ETA_MAX);
     }
     if (side == DIPOLE_FROM_BELOW && isinf(layers[count - 1].thickness_mm))
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
@@ -58,6 +53,19 @@ static bool layers_check(const dipole_layer *layers, size_t count, dipole_side s
                            count - 1);
     if (side != DIPOLE_FROM_ABOVE && side != DIPOLE_FROM_BELOW)
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "side is %d, expected a dipole_side", (int)side);
+    return true;
+}
+
+/* Of media that are sound on their own. */
+static bool ratios_check(const dipole_layer *layers, size_t count, dipole_status *status)
+{
+    for (size_t i = 1; i < count; i++) {
+        const double ratio = layers[i].medium.eta / layers[i - 1].medium.eta;
+        if (ratio < DIPOLE_ETA_MIN || ratio > DIPOLE_ETA_MAX)
+            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                               "layers[%zu].eta is %g times that of the layer above, expected %g to %g", i,
+                               ratio, DIPOLE_ETA_MIN, DIPOLE_ETA_MAX);
+    }
     return true;
 }
 
@@ -106,6 +114,8 @@ static void system_init(const dipole_stack *stack, int parameter, struct system 
     dipole_system_init(system, stack->layers, stack->coefficients, stack->count, parameter);
     if (stack->model == DIPOLE_MODEL_MODES)
         dipole_modes_init(system);
+    if (stack->model == DIPOLE_MODEL_MULTIPOLE)
+        dipole_multipole_init(system);
 }
 
 /* sigma_tr of the last layer as the model has it. */
@@ -217,7 +227,8 @@ bool dipole_stack_create(const dipole_layer *layers, size_t count, dipole_model 
     dipole_stack draft = { .count = count, .side = side, .model = model };
     for (size_t i = 0; i < count; i++)
         draft.layers[i] = layers[place(&draft, i)];
-    if (!coefficients_fill(&draft, status) || !model_check(&draft, model, status))
+    if (!coefficients_fill(&draft, status) || !ratios_check(layers, count, status) ||
+        !model_check(&draft, model, status))
         return false;
     static response_function *const responses[] = {
         [DIPOLE_MODEL_DIPOLE] = dipole_multipole_solve,
@@ -390,6 +401,8 @@ double dipole_stack_ring_mean_per_mm2(const dipole_stack *stack, dipole_face fac
         return face == DIPOLE_FACE_LIT ? stack->coefficients[0].alpha_prime / (2.0 * PI) *
                                              dipole_row_ring_mean(&stack->row, r_lo_mm, r_hi_mm)
                                        : 0.0;
+    if (r_hi_mm == r_lo_mm)
+        return profile(stack, face, r_lo_mm);
     if (r_hi_mm > 1.1 * r_lo_mm) {
         const double area_mm2 = PI * (r_hi_mm - r_lo_mm) * (r_hi_mm + r_lo_mm);
         const double within = dipole_stack_within(stack, face, r_hi_mm);
@@ -433,9 +446,10 @@ static double root_find(falling_log *f, const struct question *question, double 
         stride *= 2.0;
         a += stride, f_a = f(question, a);
     }
-    double c = a, f_c = f_a, share = 0.5;
+    double share = 0.5;
     for (;;) {
         const double x = a + share * (b - a), f_x = f(question, x);
+        double c, f_c; /* what was a or b before */
         if ((f_x > 0.0) == (f_a > 0.0)) {
             c = a, f_c = f_a;
         } else {

@@ -184,6 +184,17 @@ static void bad_requests_are_refused(void **state)
           "this model has no sources, expected \"dipole\" or \"beam\"" },
         { DIPOLE_MODEL_BEAM, 1e-10, 1.0, DIPOLE_BAD_VALUE, "epsilon is 1e-10, expected 1e-9 to 0.1" },
         { DIPOLE_MODEL_BEAM, (double)NAN, 1.0, DIPOLE_BAD_VALUE, "epsilon is nan, expected 1e-9 to 0.1" },
+        { DIPOLE_MODEL_BETTER_DIPOLE, 0.01, 1.0, DIPOLE_NOT_SUPPORTED,
+          "this model has no sources, expected \"dipole\" or \"beam\"" },
+        { (dipole_model)9, 0.01, 1.0, DIPOLE_NOT_SUPPORTED,
+          "this model has no sources, expected \"dipole\" or \"beam\"" },
+        { DIPOLE_MODEL_BEAM, 0.11, 1.0, DIPOLE_BAD_VALUE, "epsilon is 0.11, expected 1e-9 to 0.1" },
+        { DIPOLE_MODEL_BEAM, INFINITY, 1.0, DIPOLE_BAD_VALUE, "epsilon is inf, expected 1e-9 to 0.1" },
+        { DIPOLE_MODEL_BEAM, -0.01, 1.0, DIPOLE_BAD_VALUE, "epsilon is -0.01, expected 1e-9 to 0.1" },
+        { DIPOLE_MODEL_BEAM, 0.01, (double)NAN, DIPOLE_BAD_VALUE,
+          "r_min_mm is nan, expected at least 1.29534e-06" },
+        { DIPOLE_MODEL_BEAM, 0.01, -1.0, DIPOLE_BAD_VALUE,
+          "r_min_mm is -1, expected at least 1.29534e-06" },
         { DIPOLE_MODEL_BEAM, 0.01, 0.0, DIPOLE_BAD_VALUE, "r_min_mm is 0, expected at least 1.29534e-06" },
         { DIPOLE_MODEL_BEAM, 1e-9, 1e-5, DIPOLE_NOT_SUPPORTED,
           "more than 128 sources are needed for eta 1.3, r_min_mm 1e-05, epsilon 1e-09; expected larger "
@@ -199,6 +210,27 @@ static void bad_requests_are_refused(void **state)
     }
 }
 
+/* Oracle: dipole.h, NaN where a coordinate is, though no source is nearer than its depth; and nothing
+ * arrives at the end of the world. */
+static void bad_places_are_nan(void **state)
+{
+    (void)state;
+    const dipole_coefficients c = coefficients(0.032, 0.74, 1.3);
+    for (int i = 0; i < 2; i++) {
+        dipole_source sources[DIPOLE_SOURCE_LIMIT];
+        const size_t count =
+            dipole_sources_init(&c, i ? DIPOLE_MODEL_BEAM : DIPOLE_MODEL_DIPOLE, 1e-3, 0.1, sources, NULL);
+        assert_true(count > 0);
+        for (int k = 0; k < 9; k++) {
+            double at[3][3] = { { 0.0, 0.0, 0.0 }, { 0.0, 0.0, 1.0 }, { 1.0, 0.0, 0.0 } };
+            at[k / 3][k % 3] = (double)NAN;
+            assert_true(isnan(dipole_rd_between_per_mm2(&c, sources, count, at[0], at[1], at[2])));
+        }
+        const double far[3] = { INFINITY, 0.0, 0.0 };
+        assert_true(dipole_rd_between_per_mm2(&c, sources, count, origin, up, far) == 0.0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -207,6 +239,7 @@ int main(void)
         cmocka_unit_test(sheets_thinner_than_the_source_is_deep_stay_finite),
         cmocka_unit_test(the_clamp_costs_what_is_stated),
         cmocka_unit_test(bad_requests_are_refused),
+        cmocka_unit_test(bad_places_are_nan),
     };
     return cmocka_run_group_tests_name("between", tests, NULL, NULL);
 }

@@ -321,14 +321,19 @@ static void outside_the_range_is_nan(void **state)
 {
     (void)state;
     const dipole_coefficients c = coefficients(0.01, 1.0, 1.3, DIPOLE_FDR_EXACT);
-    const double bad[] = { -1.0, -1e-300, (double)NAN };
-    for (int i = 0; i < 3; i++) {
+    const double bad[] = { -1.0, -1e-300, -INFINITY, (double)NAN };
+    for (int i = 0; i < 4; i++) {
         assert_true(isnan(dipole_rd_per_mm2(&c, bad[i])));
         assert_true(isnan(dipole_reflectance_within(&c, bad[i])));
         assert_true(isnan(dipole_tail_fraction(&c, bad[i])));
         assert_true(isnan(dipole_spectrum(&c, bad[i])));
         assert_true(isnan(dipole_rd_derivative(&c, bad[i]).d_sigma_a));
         assert_true(isnan(dipole_rd_gradient(&c, bad[i]).d_log_sigma_s_prime));
+        double value, d_sigma_a, d_sigma_s_prime;
+        dipole_rd_profile_per_mm2(&c, &bad[i], 1, &value);
+        assert_true(isnan(value));
+        dipole_rd_profile_gradient(&c, &bad[i], 1, &value, &d_sigma_a, &d_sigma_s_prime);
+        assert_true(isnan(value) && isnan(d_sigma_a) && isnan(d_sigma_s_prime));
     }
     assert_true(isnan(dipole_rd_ring_mean_per_mm2(&c, 2.0, 1.0)));
     assert_true(isnan(dipole_rd_ring_mean_per_mm2(&c, -1.0, 1.0)));

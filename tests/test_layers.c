@@ -1,3 +1,4 @@
+/* Layers of any kind: derivatives, energy, powers, radii. Values against MPFR: stability_layers.c. */
 #include "libdipole/internal.h"
 #include "oracle_layers.h"
 #include "random_layers.h"
@@ -32,101 +33,12 @@ static void coefficients_of(const dipole_layer *layers, size_t count, dipole_coe
         assert_true(dipole_coefficients_init(&layers[i].medium, &coefficients[i], NULL));
 }
 
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static struct layers_oracle oracle;
-static struct layers_spectrum spectrum;
 
 /* What is smaller than this is no number to be right about: it is near where doubles end. */
 static const double least = 1e-290;
 
 /* ---- against MPFR --------------------------------------------------------------------------------- */
-
-/* Oracle: the textbook's linear equations in MPFR. R^, T^ and the totals to 1e-12, and what left without
- * scattering; the reflectance of interfaces whose indices differ by 1e-12 is only known to 1e-4. */
-static void responses_agree_with_mpfr(void **state)
-{
-    (void)state;
-    enum { CASES = 4000 / SLOWNESS };
-    static double errors[2 * CASES];
-    size_t error_count = 0;
-    struct rng rng = { .seed = 51 };
-    for (int i = 0; i < CASES; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        dipole_coefficients coefficients[RANDOM_LAYERS];
-        struct system system;
-        const size_t count = random_layers(&rng, layers);
-        coefficients_of(layers, count, coefficients);
-        dipole_system_init(&system, layers, coefficients, count, -1);
-        layers_oracle_init(&oracle, layers, coefficients, count);
-        const double l = coefficients[random_bits(&rng) % count].mean_free_path_mm;
-        const bool is_total = i % 5 == 0;
-        const double k = (is_total ? 1e-30 : log_uniform(&rng, 1e-8, 1e4)) / l;
-        double expected[2];
-        struct dual found[2];
-        layers_oracle_response(&oracle, k, expected);
-        dipole_system_solve(&system, is_total ? 0.0 : k * k, found);
-        for (int face = 0; face < 2; face++) {
-            assert_true(fabs(creal(system.unscattered[face].v) - oracle.unscattered[face]) <=
-                        1e-12 * oracle.unscattered[face] + 1e-22);
-            if (expected[face] < least && creal(found[face].v) < least)
-                continue;
-            assert_close(creal(found[face].v), expected[face], 1e-12,
-                         "case %d, %zu layers, face %d, k l %g", i, count, face, k * l);
-            errors[error_count++] = fabs(creal(found[face].v) / expected[face] - 1.0);
-        }
-        layers_oracle_clear(&oracle);
-    }
-    qsort(errors, error_count, sizeof errors[0], by_value);
-    print_message("  %d stacks, relative error: median %.1e, worst %.1e\n", CASES, errors[error_count / 2],
-                  errors[error_count - 1]);
-}
-
-/* Oracle: the same along the real k axis, transformed to distances. Both faces to 1e-10 of their value at
- * 0. */
-static void profiles_agree_with_mpfr(void **state)
-{
-    (void)state;
-    enum { CASES = 80 / SLOWNESS, RADII = 4 };
-    static double errors[2 * RADII * CASES];
-    size_t error_count = 0;
-    struct rng rng = { .seed = 52 };
-    for (int i = 0; i < CASES; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        dipole_coefficients coefficients[RANDOM_LAYERS];
-        const size_t count = random_layers(&rng, layers);
-        coefficients_of(layers, count, coefficients);
-        dipole_stack *const stack = stack_of(layers, count, DIPOLE_MODEL_BEAM);
-        layers_oracle_init(&oracle, layers, coefficients, count);
-        for (int f = 0; f < 2; f++) {
-            const dipole_face face = (dipole_face)f;
-            const double total = dipole_stack_total(stack, face), top = profile(stack, face, 0.0);
-            if (!(total > least && top > least))
-                continue;
-            const double width_mm = sqrt(total / top);
-            layers_spectrum_init(&spectrum, &oracle, 1e-7 / width_mm);
-            for (int j = 0; j < RADII; j++) {
-                const double r = width_mm * log_uniform(&rng, 1e-2, 30.0);
-                const double found = profile(stack, face, r),
-                             expected = layers_oracle_profile(&spectrum, f, r);
-                const double error = fabs(found - expected) / top;
-                if (!(error <= 1e-10))
-                    fail_msg("case %d, %zu layers, face %d, r %g: found %.15g, expected %.15g, at 0 %g", i,
-                             count, f, r, found, expected, top);
-                errors[error_count++] = error;
-            }
-        }
-        layers_oracle_clear(&oracle);
-        dipole_stack_destroy(stack);
-    }
-    qsort(errors, error_count, sizeof errors[0], by_value);
-    print_message("  %zu values, error over the value at 0: median %.1e, worst %.1e\n", error_count,
-                  errors[error_count / 2], errors[error_count - 1]);
-}
 
 /* Oracle: differences of MPFR's R^ and T^, five points; the derivatives of a decay by a nepers are a times
  * as large. Every parameter of a random layer of stacks of every kind. */
@@ -216,43 +128,6 @@ static void energy_is_kept_by_any_layers(void **state)
         }
     }
     print_message("  worst loss without absorption %.1e\n", worst);
-}
-
-static void check_falls(const dipole_stack *stack, dipole_face face, double r_first_mm, int number)
-{
-    const double total = dipole_stack_total(stack, face), top = profile(stack, face, 0.0);
-    double last = top, last_within = 0.0, last_beyond = total;
-    assert_true(isfinite(top) && top >= 0.0);
-    for (double r = r_first_mm; r < 1e9; r *= 7.3) {
-        const double value = profile(stack, face, r), within = dipole_stack_within(stack, face, r),
-                     beyond = dipole_stack_beyond(stack, face, r);
-        if (!(isfinite(value) && value >= 0.0 && value <= last * (1.0 + 1e-9) + 1e-13 * top))
-            fail_msg("case %d, face %d, r %g: %.17g after %.17g, at 0 %g", number, (int)face, r, value,
-                     last, top);
-        if (!(within >= last_within * (1.0 - 1e-9) - 1e-13 * total &&
-              beyond <= last_beyond * (1.0 + 1e-9) + 1e-13 * total && beyond >= 0.0 &&
-              fabs(within + beyond - total) <= 1e-12 * total))
-            fail_msg(
-                "case %d, face %d, r %g: within %.17g after %.17g, beyond %.17g after %.17g, total %.17g",
-                number, (int)face, r, within, last_within, beyond, last_beyond, total);
-        last = value, last_within = within, last_beyond = beyond;
-    }
-}
-
-/* Oracle: order. Profiles of any layers are finite, not negative and fall with distance, as does the power
- * beyond; that within rises, and the two add up. What is 1e-13 of the value at 0 is as good as 0. */
-static void profiles_of_any_layers_fall(void **state)
-{
-    (void)state;
-    struct rng rng = { .seed = 55 };
-    for (int i = 0; i < 1500 / SLOWNESS; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        const size_t count = random_layers(&rng, layers);
-        dipole_stack *const stack = stack_of(layers, count, DIPOLE_MODEL_BEAM);
-        for (int f = 0; f < 2; f++)
-            check_falls(stack, (dipole_face)f, log_uniform(&rng, 1e-9, 7e-9), i);
-        dipole_stack_destroy(stack);
-    }
 }
 
 /* Oracle: the integral. The power between two radii, from K_1, is the integral of the profile, from K_0. */
@@ -458,11 +333,8 @@ static void radii_and_spacings_of_any_layers_solve_their_equations(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(responses_agree_with_mpfr),
-        cmocka_unit_test(profiles_agree_with_mpfr),
         cmocka_unit_test(derivatives_agree_with_mpfr),
         cmocka_unit_test(energy_is_kept_by_any_layers),
-        cmocka_unit_test(profiles_of_any_layers_fall),
         cmocka_unit_test(powers_are_integrals_of_profiles),
         cmocka_unit_test(profiles_of_any_multipole_are_finite),
         cmocka_unit_test(derivatives_of_any_layers_are_sound),

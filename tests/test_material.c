@@ -3,6 +3,7 @@
 #include "libdipole/dipole.h"
 
 #include <stdbool.h>
+#include <string.h>
 
 static double total_of(const dipole_medium *medium, dipole_model model, dipole_coefficients *coefficients)
 {
@@ -83,33 +84,88 @@ static void absorption_falls_as_reflectance_rises(void **state)
     }
 }
 
-/* Oracle: the messages that dipole.h promises; *out stays as it was. */
+/* Oracle: the messages that dipole.h promises; *out stays as it was. %s stands for the name of the length.
+ */
 static void bad_values_are_refused(void **state)
+{
+    (void)state;
+    const struct {
+        double reflectance, length_mm, eta;
+        dipole_fdr_kind fdr_kind;
+        dipole_model model;
+        dipole_code code;
+        const char *message;
+    } rows[] = {
+        { 1.1, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE, DIPOLE_BAD_VALUE,
+          "diffuse_reflectance is 1.1, expected 0 to 1" },
+        { -1e-300, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "diffuse_reflectance is -1e-300, expected 0 to 1" },
+        { INFINITY, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "diffuse_reflectance is inf, expected 0 to 1" },
+        { (double)NAN, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE, DIPOLE_BAD_VALUE,
+          "diffuse_reflectance is nan, expected 0 to 1" },
+        { 0.5, 0.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE, DIPOLE_BAD_VALUE,
+          "%s is 0, expected > 0 (1e-50 to 1e+50)" },
+        { 0.5, -1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE, DIPOLE_BAD_VALUE,
+          "%s is -1, expected > 0 (1e-50 to 1e+50)" },
+        { 0.5, INFINITY, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE, DIPOLE_BAD_VALUE,
+          "%s is inf, expected > 0 (1e-50 to 1e+50)" },
+        { 0.5, (double)NAN, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "%s is nan, expected > 0 (1e-50 to 1e+50)" },
+        { 0.5, 9e-51, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "%s is 9e-51, expected > 0 (1e-50 to 1e+50)" },
+        { 0.5, 1.1e50, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "%s is 1.1e+50, expected > 0 (1e-50 to 1e+50)" },
+        { 0.5, 1.0, 0.0, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE, DIPOLE_BAD_VALUE,
+          "eta is 0, expected > 0 (0.1 to 10)" },
+        { 0.5, 1.0, (double)NAN, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "eta is nan, expected > 0 (0.1 to 10)" },
+        { 0.5, 1.0, INFINITY, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "eta is inf, expected > 0 (0.1 to 10)" },
+        { 0.5, 1.0, 1.3, (dipole_fdr_kind)7, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "fdr_kind is 7, expected a dipole_fdr_kind" },
+        { 0.5, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_MULTIPOLE, DIPOLE_NOT_SUPPORTED,
+          "this model has no inverse, expected \"dipole\" or \"beam\"" },
+        { 0.5, 1.0, 1.3, DIPOLE_FDR_EXACT, (dipole_model)9, DIPOLE_NOT_SUPPORTED,
+          "this model has no inverse, expected \"dipole\" or \"beam\"" },
+    };
+    for (size_t i = 0; i < 2 * (sizeof rows / sizeof rows[0]); i++) {
+        const char *const rest = strstr(rows[i / 2].message, "%s") ? rows[i / 2].message + 2 : NULL;
+        char expected[128];
+        snprintf(expected, sizeof expected, "%s%s",
+                 rest == NULL ? ""
+                 : i % 2      ? "diffuse_mean_free_path_mm"
+                              : "mean_free_path_mm",
+                 rest == NULL ? rows[i / 2].message : rest);
+        dipole_medium out = { .eta = 42.0 };
+        dipole_status status = { .code = DIPOLE_OK };
+        assert_false(
+            (i % 2 ? dipole_medium_from_diffuse_mean_free_path : dipole_medium_from_mean_free_path)(
+                rows[i / 2].reflectance, rows[i / 2].length_mm, rows[i / 2].eta, rows[i / 2].fdr_kind,
+                rows[i / 2].model, &out, &status));
+        assert_int_equal(status.code, rows[i / 2].code);
+        assert_string_equal(status.message, expected);
+        assert_true(out.eta == 42.0);
+    }
+}
+
+/* Oracle: dipole.h. What is asked for is legal, but no legal medium does it. */
+static void media_out_of_range_are_refused(void **state)
 {
     (void)state;
     dipole_medium out = { .eta = 42.0 };
     dipole_status status;
-    assert_false(dipole_medium_from_mean_free_path(1.1, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE,
-                                                   &out, &status));
-    assert_string_equal(status.message, "diffuse_reflectance is 1.1, expected 0 to 1");
-    assert_false(dipole_medium_from_mean_free_path((double)NAN, 1.0, 1.3, DIPOLE_FDR_EXACT,
-                                                   DIPOLE_MODEL_DIPOLE, &out, &status));
-    assert_string_equal(status.message, "diffuse_reflectance is nan, expected 0 to 1");
-    assert_false(dipole_medium_from_mean_free_path(0.5, 0.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE,
-                                                   &out, &status));
-    assert_string_equal(status.message, "mean_free_path_mm is 0, expected > 0 (1e-50 to 1e+50)");
-    assert_false(dipole_medium_from_mean_free_path(0.5, 1.0, 0.0, DIPOLE_FDR_EXACT, DIPOLE_MODEL_DIPOLE,
-                                                   &out, &status));
-    assert_string_equal(status.message, "eta is 0, expected > 0 (0.1 to 10)");
-    assert_false(dipole_medium_from_mean_free_path(0.5, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_MULTIPOLE,
-                                                   &out, &status));
-    assert_int_equal(status.code, DIPOLE_NOT_SUPPORTED);
-    assert_string_equal(status.message, "this model has no inverse, expected \"dipole\" or \"beam\"");
     assert_false(dipole_medium_from_diffuse_mean_free_path(1.0, 1.0, 1.3, DIPOLE_FDR_EXACT,
                                                            DIPOLE_MODEL_DIPOLE, &out, &status));
+    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
     assert_string_equal(status.message,
                         "diffuse_reflectance is 1, where light travels without end, expected less "
                         "beside diffuse_mean_free_path_mm");
+    assert_false(dipole_medium_from_mean_free_path(1e-60, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM,
+                                                   &out, &status));
+    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
+    assert_non_null(strstr(status.message, ", expected >= 0 (0, or 1e-50 to 1e+50)"));
+    assert_true(strncmp(status.message, "sigma_s_prime_per_mm is ", 24) == 0);
     assert_true(out.eta == 42.0);
 }
 
@@ -120,6 +176,7 @@ int main(void)
         cmocka_unit_test(absorption_keeps_its_digits_near_one),
         cmocka_unit_test(absorption_falls_as_reflectance_rises),
         cmocka_unit_test(bad_values_are_refused),
+        cmocka_unit_test(media_out_of_range_are_refused),
     };
     return cmocka_run_group_tests_name("material", tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #include "libdipole/dipole.h"
 
 #include <complex.h>
+#include <string.h>
 
 #define PI 3.14159265358979323846
 
@@ -604,6 +605,8 @@ static void bad_stacks_are_refused(void **state)
         { many, 17, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE, "17 layers, expected 1 to 16" },
         { negative, 2, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
           "layers[0].sigma_s_prime_per_mm is -1, expected >= 0 (0, or 1e-50 to 1e+50)" },
+        { negative, 1, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
+          "sigma_s_prime_per_mm is -1, expected >= 0 (0, or 1e-50 to 1e+50)" },
         { inside, 2, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
           "layers[0].thickness_mm is inf, expected > 0 (1e-50 to 1e+50)" },
         { &nothing, 1, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
@@ -628,15 +631,116 @@ static void bad_stacks_are_refused(void **state)
         assert_string_equal(status.message, rows[i].message);
     }
     dipole_stack_destroy(NULL);
-    const dipole_layer skin = layer(0.032, 0.74, 1.3, INFINITY);
-    dipole_stack *const stack = stack_of(&skin, 1, DIPOLE_MODEL_BEAM);
-    assert_true(isnan(profile(stack, DIPOLE_FACE_LIT, -1.0)) &&
-                isnan(profile(stack, DIPOLE_FACE_LIT, (double)NAN)));
-    assert_true(isnan(dipole_stack_within(stack, DIPOLE_FACE_LIT, -1.0)));
-    assert_true(isnan(dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, -1.0)));
-    assert_true(isnan(dipole_stack_r_max_mm(stack, DIPOLE_FACE_LIT, 0.0)));
-    assert_true(isnan(dipole_stack_ring_mean_per_mm2(stack, DIPOLE_FACE_LIT, 2.0, 1.0)));
-    dipole_stack_destroy(stack);
+}
+
+/* Oracle: the ranges in dipole.h. Whichever field of whichever layer is bad is the one that is named. */
+static void every_bad_field_is_named(void **state)
+{
+    (void)state;
+    const struct {
+        const char *name;
+        size_t offset;
+        double bad[6];
+    } fields[] = {
+        { "sigma_a_per_mm",
+          offsetof(dipole_layer, medium.sigma_a_per_mm),
+          { (double)NAN, INFINITY, -INFINITY, -1.0, 9e-51, 1.1e50 } },
+        { "sigma_s_prime_per_mm",
+          offsetof(dipole_layer, medium.sigma_s_prime_per_mm),
+          { (double)NAN, INFINITY, -INFINITY, -1.0, 9e-51, 1.1e50 } },
+        { "eta", offsetof(dipole_layer, medium.eta), { (double)NAN, INFINITY, 0.0, -1.3, 0.09, 11.0 } },
+        { "thickness_mm",
+          offsetof(dipole_layer, thickness_mm),
+          { (double)NAN, -INFINITY, 0.0, -1.0, 9e-51, 1.1e50 } },
+    };
+    for (size_t f = 0; f < sizeof fields / sizeof fields[0]; f++)
+        for (size_t i = 0; i < 3 * 6 * 2 * 2; i++) {
+            const size_t place = i % 3;
+            const double bad = fields[f].bad[i / 3 % 6];
+            dipole_layer layers[3];
+            for (int k = 0; k < 3; k++)
+                layers[k] = layer(0.1, 2.0, 1.3, 3.0);
+            memcpy((char *)&layers[place] + fields[f].offset, &bad, sizeof bad);
+            char expected[64];
+            snprintf(expected, sizeof expected, "layers[%zu].%s is %g, expected > 0", place, fields[f].name,
+                     bad);
+            if (strstr(fields[f].name, "sigma") != NULL)
+                strcpy(strchr(expected, '>'), ">= 0");
+            dipole_stack *stack = (dipole_stack *)&stack;
+            dipole_status status = { .code = DIPOLE_OK };
+            assert_false(
+                dipole_stack_create(layers, 3, i / 18 % 2 ? DIPOLE_MODEL_BEAM : DIPOLE_MODEL_MULTIPOLE,
+                                    i / 36 ? DIPOLE_FROM_BELOW : DIPOLE_FROM_ABOVE, &stack, &status));
+            assert_null(stack);
+            assert_int_equal(status.code, DIPOLE_BAD_VALUE);
+            if (strncmp(status.message, expected, strlen(expected)) != 0)
+                fail_msg("found \"%s\", expected \"%s ...\"", status.message, expected);
+        }
+}
+
+/* Oracle: dipole.h, the sides there are, and light from below meets a finite layer first. */
+static void bad_sides_are_refused(void **state)
+{
+    (void)state;
+    const dipole_layer skin = layer(0.032, 0.74, 1.3, INFINITY), slab = layer(0.032, 0.74, 1.3, 5.0);
+    dipole_stack *stack;
+    dipole_status status;
+    assert_false(dipole_stack_create(&skin, 1, DIPOLE_MODEL_BEAM, DIPOLE_FROM_BELOW, &stack, &status));
+    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
+    assert_string_equal(status.message,
+                        "layers[0].thickness_mm is inf, expected a finite one for light from below");
+    assert_false(dipole_stack_create(&slab, 1, DIPOLE_MODEL_BEAM, (dipole_side)7, &stack, &status));
+    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
+    assert_string_equal(status.message, "side is 7, expected a dipole_side");
+}
+
+/* Oracle: the ranges in dipole.h, of every model and face; and the far end of them is none of these. */
+static void outside_the_range_is_nan(void **state)
+{
+    (void)state;
+    const dipole_layer layers[2] = { layer(0.1, 2.0, 1.3, 3.0), layer(0.032, 0.74, 1.3, INFINITY) };
+    const struct {
+        size_t first, count;
+        dipole_model model;
+    } rows[] = { { 1, 1, DIPOLE_MODEL_DIPOLE },
+                 { 1, 1, DIPOLE_MODEL_BETTER_DIPOLE },
+                 { 1, 1, DIPOLE_MODEL_BEAM },
+                 { 0, 2, DIPOLE_MODEL_MULTIPOLE },
+                 { 0, 2, DIPOLE_MODEL_BEAM } };
+    const double bad_mm[] = { -1.0, -1e-300, -INFINITY, (double)NAN };
+    const double bad_epsilon[] = { 0.0, -0.1, 9e-101, 4.0, INFINITY, (double)NAN };
+    for (size_t i = 0; i < 2 * (sizeof rows / sizeof rows[0]); i++) {
+        dipole_stack *const stack =
+            stack_of(&layers[rows[i / 2].first], rows[i / 2].count, rows[i / 2].model);
+        const dipole_face face = i % 2 ? DIPOLE_FACE_FAR : DIPOLE_FACE_LIT;
+        dipole_stack_gradient gradient;
+        for (size_t k = 0; k < sizeof bad_mm / sizeof bad_mm[0]; k++) {
+            assert_true(isnan(profile(stack, face, bad_mm[k])));
+            assert_true(isnan(dipole_stack_within(stack, face, bad_mm[k])));
+            assert_true(isnan(dipole_stack_beyond(stack, face, bad_mm[k])));
+            assert_true(isnan(dipole_stack_spectrum(stack, face, bad_mm[k])));
+            assert_true(isnan(dipole_stack_ring_mean_per_mm2(stack, face, bad_mm[k], 1.0)));
+            assert_true(isnan(dipole_stack_ring_mean_per_mm2(stack, face, 0.0, bad_mm[k])));
+            dipole_stack_profile_gradient(stack, face, 0, &bad_mm[k], 1, &gradient);
+            assert_true(isnan(gradient.d_log_sigma_a) && isnan(gradient.d_log_sigma_s_prime) &&
+                        isnan(gradient.d_log_thickness));
+        }
+        for (size_t k = 0; k < sizeof bad_epsilon / sizeof bad_epsilon[0]; k++) {
+            assert_true(isnan(dipole_stack_r_max_mm(stack, face, bad_epsilon[k])));
+            assert_true(isnan(dipole_stack_splat_spacing_mm(stack, face, bad_epsilon[k])));
+        }
+        assert_true(isnan(dipole_stack_r_max_mm(stack, face, 1.0)));
+        const double far_mm = INFINITY;
+        assert_true(profile(stack, face, far_mm) == 0.0 && dipole_stack_beyond(stack, face, far_mm) == 0.0);
+        assert_true(dipole_stack_spectrum(stack, face, far_mm) == 0.0);
+        assert_true(dipole_stack_ring_mean_per_mm2(stack, face, far_mm, far_mm) == 0.0);
+        assert_true(dipole_stack_ring_mean_per_mm2(stack, face, 0.0, far_mm) == 0.0);
+        assert_close(dipole_stack_within(stack, face, far_mm), dipole_stack_total(stack, face), 1e-15,
+                     "model %d, face %d", (int)rows[i / 2].model, (int)face);
+        dipole_stack_profile_gradient(stack, face, 0, &far_mm, 1, &gradient);
+        assert_true(gradient.d_log_sigma_a == 0.0 && gradient.d_log_sigma_s_prime == 0.0);
+        dipole_stack_destroy(stack);
+    }
 }
 
 int main(void)
@@ -659,6 +763,9 @@ int main(void)
         cmocka_unit_test(light_from_below_meets_the_layers_in_reverse),
         cmocka_unit_test(splat_spacing_solves_its_equation),
         cmocka_unit_test(bad_stacks_are_refused),
+        cmocka_unit_test(every_bad_field_is_named),
+        cmocka_unit_test(bad_sides_are_refused),
+        cmocka_unit_test(outside_the_range_is_nan),
     };
     return cmocka_run_group_tests_name("stack", tests, NULL, NULL);
 }
