@@ -114,7 +114,7 @@ static void system_init(const dipole_stack *stack, int parameter, struct system 
     dipole_system_init(system, stack->layers, stack->coefficients, stack->count, parameter);
     if (stack->model == DIPOLE_MODEL_MODES)
         dipole_modes_init(system);
-    if (stack->model == DIPOLE_MODEL_MULTIPOLE)
+    if (stack->response == dipole_multipole_solve) /* the dipole's, too */
         dipole_multipole_init(system);
 }
 
