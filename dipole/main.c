@@ -282,7 +282,7 @@ int main(int argc, char **argv)
             "FILE.csv has a header line and the columns r_mm,rd_per_mm2[,sem] or, for means over rings, "
             "r_lo_mm,r_hi_mm,rd_per_mm2[,sem]; tables of MCML runs with R_per_mm2 and R_sem_per_mm2 are "
             "read as well. Lines that begin with # are comments.\n\n"
-            "  dipole marble --model dipole,beam --plot models.svg\n"
+            "  dipole marble --model dipole,beam,modes --plot models.svg\n"
             "  dipole layered/marble_slab --lit-from below --at 0,1,5\n",
         .options = table,
         .operand_min = 1,
