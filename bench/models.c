@@ -19,9 +19,9 @@ static const struct model {
     const char *name;
     dipole_model model;
     dipole_fdr_kind fdr_kind;
-    bool is_multiple_only; /* compared with light that was scattered more than once                    */
-    bool is_variant;       /* not drawn, not timed       */
-    const char *refusal;   /* why it cannot do some stacks; NULL where it can do all                    */
+    bool is_multiple_only; /* compared with light that was scattered more than once    */
+    bool is_variant;       /* of the model before it: not drawn, not timed             */
+    const char *refusal;   /* why it cannot do some stacks; NULL where it can do all   */
 } models[] = {
     { "dipole", DIPOLE_MODEL_DIPOLE, DIPOLE_FDR_EXACT, false, false, "half-space only" },
     { "dipole, polynomial Fdr", DIPOLE_MODEL_DIPOLE, DIPOLE_FDR_POLYNOMIAL, false, true,
@@ -66,6 +66,21 @@ static struct monte_carlo cases[CASE_LIMIT];
 static struct slab slabs[SLAB_LIMIT];
 static size_t case_count, slab_count;
 
+static void stop(const char *what, const char *which)
+{
+    fprintf(stderr, "bench_models: %s %s\n", what, which);
+    exit(EXIT_FAILED);
+}
+
+static const struct monte_carlo *find_case(const char *name)
+{
+    for (size_t i = 0; i < case_count; i++)
+        if (strcmp(cases[i].name, name) == 0)
+            return &cases[i];
+    stop("no case", name);
+    return NULL;
+}
+
 /* ---- the reference -------------------------------------------------------------------------------- */
 
 /* The next line that is no comment. */
@@ -82,10 +97,8 @@ static FILE *open_table(const char *folder, const char *name)
     char path[4096], header[4096];
     snprintf(path, sizeof path, "%s/%s", folder, name);
     FILE *const file = fopen(path, "r");
-    if (!file || !next_line(file, header, sizeof header)) {
-        fprintf(stderr, "bench_models: cannot read %s\n", path);
-        exit(EXIT_FAILED);
-    }
+    if (!file || !next_line(file, header, sizeof header))
+        stop("cannot read", path);
     return file;
 }
 
@@ -158,10 +171,8 @@ static void read_monte_carlo(const char *folder)
         double specular, r, r0, t, t0;
         if (sscanf(line, "%63[^,],\"%511[^\"]\",%*d,%*d,%*d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", mc->name,
                    mc->layers_text, &specular, &r, &mc->r_sem, &r0, &mc->r1, &t, &mc->t_sem, &t0) != 10 ||
-            (mc->layer_count = parse_layers(mc->layers_text, mc->layers)) == 0) {
-            fprintf(stderr, "bench_models: mcml_totals.csv: %s", line);
-            exit(EXIT_FAILED);
-        }
+            (mc->layer_count = parse_layers(mc->layers_text, mc->layers)) == 0)
+            stop("mcml_totals.csv has the line", line);
         const double entered = 1.0 - specular;
         mc->r = (r + r0) / entered;
         mc->t = (t + t0) / entered;
@@ -211,10 +222,8 @@ static dipole_stack *stack_of(const struct model *model, const dipole_layer *lay
         own[i].medium.fdr_kind = model->fdr_kind;
     if (dipole_stack_create(own, count, model->model, DIPOLE_FROM_ABOVE, &stack, &status))
         return stack;
-    if (status.code != DIPOLE_NOT_SUPPORTED) {
-        fprintf(stderr, "bench_models: %s: %s\n", model->name, status.message);
-        exit(EXIT_FAILED);
-    }
+    if (status.code != DIPOLE_NOT_SUPPORTED)
+        stop(model->name, status.message);
     return NULL;
 }
 
@@ -431,15 +440,23 @@ static void print_slab_summary(const char *title, enum extent extent, bool is_lo
     }
 }
 
+/* Has the model a column among half-spaces, or among slabs? */
+static bool is_listed(const struct model *model, bool wants_half_space)
+{
+    const bool knows_slabs =
+        model->model != DIPOLE_MODEL_DIPOLE && model->model != DIPOLE_MODEL_BETTER_DIPOLE;
+    return !model->is_multiple_only && (wants_half_space || knows_slabs);
+}
+
 static void print_slabs(bool wants_half_space)
 {
     printf("\n| α' | g | n | thickness/ℓ |");
     for (size_t m = 0; m < COUNT(models); m++)
-        if (!models[m].is_multiple_only && (wants_half_space || models[m].model >= DIPOLE_MODEL_MULTIPOLE))
+        if (is_listed(&models[m], wants_half_space))
             printf(wants_half_space ? " %s R |" : " %s R | T |", models[m].name);
     printf("\n|---|---|---|---|");
     for (size_t m = 0; m < COUNT(models); m++)
-        if (!models[m].is_multiple_only && (wants_half_space || models[m].model >= DIPOLE_MODEL_MULTIPOLE))
+        if (is_listed(&models[m], wants_half_space))
             printf(wants_half_space ? "---|" : "---|---|");
     printf("\n");
     for (size_t i = 0; i < slab_count; i++) {
@@ -449,8 +466,7 @@ static void print_slabs(bool wants_half_space)
         printf("| %.4g | %.4g | %.4g | ", s->alpha_prime, s->g, s->eta);
         printf(wants_half_space ? "∞ |" : "%.3g |", s->tau_prime);
         for (size_t m = 0; m < COUNT(models); m++) {
-            if (models[m].is_multiple_only ||
-                (!wants_half_space && models[m].model < DIPOLE_MODEL_MULTIPOLE))
+            if (!is_listed(&models[m], wants_half_space))
                 continue;
             dipole_stack *const stack = stack_of(&models[m], &s->layer, 1);
             const double parts[2] = { s->r, s->t };
@@ -498,9 +514,7 @@ static struct times measure(const struct model *model, const struct monte_carlo 
 static void print_times(const char *name)
 {
     struct times shortest[COUNT(models)];
-    const struct monte_carlo *mc = cases;
-    while (strcmp(mc->name, name) != 0)
-        mc++;
+    const struct monte_carlo *const mc = find_case(name);
     double r_mm[BATCH];
     for (int i = 0; i < BATCH; i++)
         r_mm[i] = mc->mean_free_path_mm * 0.05 * pow(400.0, (double)i / BATCH);
@@ -530,9 +544,7 @@ static bool draw(const char *path, const char *name, dipole_status *status)
     static double x[PLOT_RINGS], y[COUNT(models)][PLOT_RINGS], low[PLOT_RINGS], high[PLOT_RINGS];
     struct plot_series series[COUNT(models) + 1];
     size_t series_count = 0, ring_count = 0, dash = 0;
-    const struct monte_carlo *mc = cases;
-    while (strcmp(mc->name, name) != 0)
-        mc++;
+    const struct monte_carlo *const mc = find_case(name);
     double edges[PLOT_RINGS + 1] = { 0.1 };
     while (ring_count < PLOT_RINGS && edges[ring_count] < 12.0) {
         const double width = fmax(0.1, 0.15 * edges[ring_count]);
@@ -594,10 +606,8 @@ int main(int argc, char **argv)
     }
     read_monte_carlo(argv[1]);
     read_adding_doubling(argv[1]);
-    if (argc == 3 && !draw(argv[2], "semi_skin1R_n13", &status)) {
-        fprintf(stderr, "bench_models: %s\n", status.message);
-        return EXIT_FAILED;
-    }
+    if (argc == 3 && !draw(argv[2], "semi_skin1R_n13", &status))
+        stop(argv[2], status.message);
     printf("### Time\n\n"
            "| case | model | create, µs | ns per radius, 1024 in a call | ns per call of one radius |\n"
            "|---|---|---|---|---|\n");

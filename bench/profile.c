@@ -1,14 +1,14 @@
 /* What one evaluation costs, beside as many exponentials in the same run. Prints two Markdown tables. */
 #include "bench/bare_exp.h"
-#include "bench/timing.h"
 #include "cli/cli.h"
 #include "libdipole/dipole.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-enum { RADIUS_COUNT = 4096, ROW_LIMIT = 16 };
+enum { RADIUS_COUNT = 4096, ROW_LIMIT = 16, ROUND_COUNT = 41 };
 
 static double radii_mm[RADIUS_COUNT], values[RADIUS_COUNT], d_sigma_a[RADIUS_COUNT],
     d_sigma_s_prime[RADIUS_COUNT];
@@ -132,17 +132,30 @@ static double pass_ns(const struct row *row)
     return ns;
 }
 
-/* All rows in turns; medians, and how often the first row goes into each. */
+static int compare(const void *a, const void *b)
+{
+    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
+}
+
+/* Of one time per round; sorts them. */
+static double median(double times[ROUND_COUNT])
+{
+    qsort(times, ROUND_COUNT, sizeof times[0], compare);
+    return times[ROUND_COUNT / 2];
+}
+
+/* All rows in turns, so that a busy moment of the machine hits all alike; medians, and how often the first
+ * row goes into each. */
 static void print_table(const char *heading, const struct row *rows, size_t row_count)
 {
-    static double ns[ROW_LIMIT][TIMING_ROUNDS];
-    for (int round = 0; round < TIMING_ROUNDS; round++)
+    static double ns[ROW_LIMIT][ROUND_COUNT];
+    for (int round = 0; round < ROUND_COUNT; round++)
         for (size_t i = 0; i < row_count; i++)
             ns[i][round] = pass_ns(&rows[i]);
-    const double unit_ns = timing_median(ns[0]);
+    const double unit_ns = median(ns[0]);
     printf("\n| %s | ns | in units of the first row |\n|---|---|---|\n", heading);
     for (size_t i = 0; i < row_count; i++) {
-        const double median_ns = timing_median(ns[i]);
+        const double median_ns = median(ns[i]);
         printf("| %s | %.1f | %.2f |\n", rows[i].name, median_ns, median_ns / unit_ns);
     }
 }
