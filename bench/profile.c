@@ -1,19 +1,21 @@
-/* What one evaluation costs, beside as many calls of exp() in the same run. Prints a Markdown table. */
+/* What one evaluation costs, beside as many exponentials in the same run. Prints two Markdown tables. */
+#include "bench/bare_exp.h"
+#include "bench/timing.h"
 #include "cli/cli.h"
 #include "libdipole/dipole.h"
 
 #include <math.h>
 
-enum { RADIUS_COUNT = 4096, REPEAT_COUNT = 200 };
+#define COUNT(array) (sizeof(array) / sizeof *(array))
 
-static double radii_mm[RADIUS_COUNT];
+enum { RADIUS_COUNT = 4096, ROW_LIMIT = 16 };
+
+static double radii_mm[RADIUS_COUNT], values[RADIUS_COUNT], d_sigma_a[RADIUS_COUNT],
+    d_sigma_s_prime[RADIUS_COUNT];
 static dipole_coefficients coefficients;
 static dipole_stack *half_space, *layers;
 
-static double exp_twice(double r_mm)
-{
-    return exp(-0.3 * r_mm) + exp(-0.4 * r_mm);
-}
+/* ---- one radius a call ---------------------------------------------------------------------------- */
 
 static double rd(double r_mm)
 {
@@ -62,37 +64,108 @@ static double beam_layers(double r_mm)
     return stack_profile(layers, r_mm);
 }
 
-/* Shortest of REPEAT_COUNT passes over the radii, in ns per call. */
-static double measure_ns(double (*function)(double), int call_count, volatile double *sink)
+/* ---- many radii a call ---------------------------------------------------------------------------- */
+
+static void all_bare_exp(size_t count)
 {
-    double shortest_s = INFINITY;
-    for (int i = 0; i < REPEAT_COUNT; i++) {
-        double sum = 0.0;
-        const double start_s = cli_now_s();
-        for (int k = 0; k < call_count; k++)
-            sum += function(radii_mm[k]);
-        shortest_s = fmin(shortest_s, cli_now_s() - start_s);
-        *sink = sum;
+    bare_exp(radii_mm, count, values);
+}
+
+/* The formula of T5 as one writes it down, with the C library's exp() one at a time. */
+static void all_formula(size_t count)
+{
+    const double z[2] = { coefficients.z_r_mm, coefficients.z_v_mm };
+    const double sigma_tr = coefficients.sigma_tr_per_mm,
+                 factor = coefficients.alpha_prime / (4.0 * 3.14159265358979323846);
+    for (size_t i = 0; i < count; i++) {
+        values[i] = 0.0;
+        for (int k = 0; k < 2; k++) {
+            const double d = sqrt(radii_mm[i] * radii_mm[i] + z[k] * z[k]);
+            values[i] += factor * z[k] * (sigma_tr + 1.0 / d) * exp(-sigma_tr * d) / (d * d);
+        }
     }
-    return 1e9 * shortest_s / call_count;
+}
+
+static void all_profile(size_t count)
+{
+    dipole_rd_profile_per_mm2(&coefficients, radii_mm, count, values);
+}
+
+static void all_gradients(size_t count)
+{
+    dipole_rd_profile_gradient(&coefficients, radii_mm, count, values, d_sigma_a, d_sigma_s_prime);
+}
+
+static void all_beam(size_t count)
+{
+    dipole_stack_profile_per_mm2(half_space, DIPOLE_FACE_LIT, radii_mm, count, values);
+}
+
+static void all_layers(size_t count)
+{
+    dipole_stack_profile_per_mm2(layers, DIPOLE_FACE_LIT, radii_mm, count, values);
+}
+
+/* ---- the tables ----------------------------------------------------------------------------------- */
+
+struct row {
+    const char *name;
+    double (*one)(double r_mm); /* or */
+    void (*all)(size_t count);
+    size_t count; /* of radii in a pass */
+};
+
+/* ns per radius of one pass. */
+static double pass_ns(const struct row *row)
+{
+    static volatile double sink;
+    double sum = 0.0;
+    const double start_s = cli_now_s();
+    if (row->all)
+        row->all(row->count);
+    else
+        for (size_t k = 0; k < row->count; k++)
+            sum += row->one(radii_mm[k * (RADIUS_COUNT / row->count)]);
+    const double ns = 1e9 * (cli_now_s() - start_s) / (double)row->count;
+    sink = sum + values[row->count - 1];
+    (void)sink;
+    return ns;
+}
+
+/* All rows in turns; medians, and how often the first row goes into each. */
+static void print_table(const char *heading, const struct row *rows, size_t row_count)
+{
+    static double ns[ROW_LIMIT][TIMING_ROUNDS];
+    for (int round = 0; round < TIMING_ROUNDS; round++)
+        for (size_t i = 0; i < row_count; i++)
+            ns[i][round] = pass_ns(&rows[i]);
+    const double unit_ns = timing_median(ns[0]);
+    printf("\n| %s | ns | in units of the first row |\n|---|---|---|\n", heading);
+    for (size_t i = 0; i < row_count; i++) {
+        const double median_ns = timing_median(ns[i]);
+        printf("| %s | %.1f | %.2f |\n", rows[i].name, median_ns, median_ns / unit_ns);
+    }
 }
 
 int main(void)
 {
-    const struct {
-        const char *name;
-        double (*function)(double);
-        int call_count;
-    } rows[] = {
-        { "two exp()", exp_twice, RADIUS_COUNT },
-        { "Rd(r)", rd, RADIUS_COUNT },
-        { "its two derivatives", gradient, RADIUS_COUNT },
-        { "within(r)", within, RADIUS_COUNT },
-        { "tail(r)", tail, RADIUS_COUNT },
-        { "r_max(epsilon)", r_max, 64 },
-        { "Fdr(eta), exact", fdr, 64 },
-        { "R(r), beam model, half-space", beam, 256 },
-        { "R(r), beam model, two layers", beam_layers, 256 },
+    static const struct row batches[] = {
+        { "two exp(), vector code of the C library", NULL, all_bare_exp, RADIUS_COUNT },
+        { "Rd(r) as a loop over its formula, scalar exp()", NULL, all_formula, RADIUS_COUNT },
+        { "`dipole_rd_profile_per_mm2`", NULL, all_profile, RADIUS_COUNT },
+        { "`dipole_rd_profile_gradient`: Rd and two derivatives", NULL, all_gradients, RADIUS_COUNT },
+        { "`dipole_stack_profile_per_mm2`: beam model, half-space", NULL, all_beam, 256 },
+        { "the same: beam model, two layers", NULL, all_layers, 256 },
+    };
+    static const struct row calls[] = {
+        { "Rd(r)", rd, NULL, RADIUS_COUNT },
+        { "its two derivatives", gradient, NULL, RADIUS_COUNT },
+        { "within(r)", within, NULL, RADIUS_COUNT },
+        { "tail(r)", tail, NULL, RADIUS_COUNT },
+        { "r_max(epsilon)", r_max, NULL, 64 },
+        { "Fdr(eta), exact", fdr, NULL, 64 },
+        { "R(r), beam model, half-space", beam, NULL, 256 },
+        { "R(r), beam model, two layers", beam_layers, NULL, 256 },
     };
     const dipole_medium marble_green = { .sigma_a_per_mm = 0.0041,
                                          .sigma_s_prime_per_mm = 2.62,
@@ -105,14 +178,8 @@ int main(void)
         return EXIT_FAILED;
     for (int i = 0; i < RADIUS_COUNT; i++)
         radii_mm[i] = 20.0 * i / RADIUS_COUNT;
-    volatile double sink = 0.0;
-    double unit_ns = 0.0;
-    printf("| one call of | ns | in units of two exp() |\n|---|---|---|\n");
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        const double ns = measure_ns(rows[i].function, rows[i].call_count, &sink);
-        unit_ns = i == 0 ? ns : unit_ns;
-        printf("| %s | %.1f | %.1f |\n", rows[i].name, ns, ns / unit_ns);
-    }
+    print_table("one of many radii in a call", batches, COUNT(batches));
+    print_table("one call of", calls, COUNT(calls));
     dipole_stack_destroy(half_space);
     dipole_stack_destroy(layers);
     return EXIT_DONE;

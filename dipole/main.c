@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MODEL_LIMIT = 4 };
+enum { MODEL_LIMIT = 5 };
 
 struct options {
     struct cli_common common;
@@ -44,10 +44,11 @@ static bool add_model(struct options *options, const char *name, size_t length, 
            (strlen(io_model_names[model]) != length || strncmp(io_model_names[model], name, length) != 0))
         model++;
     if (!io_model_names[model])
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
-                           "--model has \"%.*s\", expected dipole, better_dipole, multipole or beam, with "
-                           "commas between",
-                           (int)(length < 100 ? length : 100), name);
+        return dipole_fail(
+            status, DIPOLE_BAD_VALUE, NULL,
+            "--model has \"%.*s\", expected dipole, better_dipole, multipole, beam or modes, with "
+            "commas between",
+            (int)(length < 100 ? length : 100), name);
     for (size_t i = 0; i < options->model_count; i++)
         if (options->models[i] == (dipole_model)model)
             return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "--model has \"%s\" twice",
@@ -225,7 +226,7 @@ int main(int argc, char **argv)
           .target = &options.at_mm,
           .argument = "R,R,...",
           .min = 0,
-          .max = DIPOLE_SIGMA_MAX_PER_MM,
+          .max = 1e300,
           .help = "Distances in mm at which the profile is printed; default 1, 2, 5 per decade." },
         { .name = "plot",
           .letter = 'p',
@@ -239,7 +240,7 @@ int main(int argc, char **argv)
           .target = &options.model_lists,
           .argument = "NAME,...",
           .help = "Show the materials by these models in place of their own, with the same coefficients: "
-                  "dipole, better_dipole, multipole, beam; may be repeated." },
+                  "dipole, better_dipole, multipole, beam, modes; may be repeated." },
         { .name = "lit-from",
           .kind = CLI_CHOICE,
           .target = &options.side,
@@ -272,7 +273,8 @@ int main(int argc, char **argv)
         .details =
             "MATERIAL.json is a file or the name of a bundled material, such as marble.\n\n"
             "mean_free_path is 1/(sigma_a + sigma_s'), diffuse_mean_free_path is 1/sigma_tr: renderers "
-            "call either of them radius. rd is the diffuse reflectance profile: power leaving per mm^2 "
+            "call either of them radius. They, z_r and z_v are those of the classical dipole, whatever the "
+            "model. rd is the diffuse reflectance profile: power leaving per mm^2 "
             "for one unit of power entering; diffuse_reflectance is its integral, r_max the radius "
             "beyond which the part epsilon of it lies, splat_spacing the largest distance of light "
             "samples. td and diffuse_transmittance are the same for light that leaves by the far face of "
@@ -280,7 +282,7 @@ int main(int argc, char **argv)
             "FILE.csv has a header line and the columns r_mm,rd_per_mm2[,sem] or, for means over rings, "
             "r_lo_mm,r_hi_mm,rd_per_mm2[,sem]; tables of MCML runs with R_per_mm2 and R_sem_per_mm2 are "
             "read as well. Lines that begin with # are comments.\n\n"
-            "  dipole marble --model dipole,beam --plot models.svg\n"
+            "  dipole marble --model dipole,beam,modes --plot models.svg\n"
             "  dipole layered/marble_slab --lit-from below --at 0,1,5\n",
         .options = table,
         .operand_min = 1,

@@ -55,7 +55,7 @@ static bool job_read(const struct cli_tool *tool, const struct options *options,
         return false;
     if (!options->start_path)
         return true;
-    if (!io_material_read(options->start_path, &start, status) ||
+    if (!io_material_open(options->start_path, &start, status) ||
         !io_material_check_classical(&start, status))
         return false;
     if (start.warning[0])
@@ -222,7 +222,8 @@ int main(int argc, char **argv)
           .kind = CLI_TEXT,
           .target = &options.start_path,
           .argument = "MATERIAL.json",
-          .help = "Begin the search at this material's coefficients (default: the scene's)." },
+          .help = "Begin the search at the coefficients of this material, a file or a bundled name such as "
+                  "skin1 (default: the scene's)." },
         { .name = "allow-path",
           .kind = CLI_TEXTS,
           .target = &options.allowed_paths,

@@ -213,7 +213,7 @@ static void a_channel_without_light_keeps_the_start(void **state)
     write_knot_with("red.json", "\"irradiance\": 3", "\"irradiance\": [3, 0, 0]");
     run_tool(&run, "render", "red.json", "-q", "--epsilon", "0.02", "-o", "red.exr");
     assert_int_equal(run.exit_code, 0);
-    run_tool(&run, "fit", "red.json", "red.exr", "--start", skin1_path, "-o", "found.json");
+    run_tool(&run, "fit", "red.json", "red.exr", "--start", "skin1", "-o", "found.json");
     assert_done(&run);
     assert_non_null(strstr(run.out, "G: no light enters or leaves in this channel"));
     struct io_material truth, start, found;
