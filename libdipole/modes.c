@@ -390,65 +390,71 @@ static void pass_thin(const struct mode_layer *layer, const struct crossing x[N]
 }
 
 /*
- * Any other layer, in its modes, cosh and sinh times unit, so that psi_near = m psi_far/unit. A mode that
- * changes much is the sum of e^(-qx) psi_near and of sinh qx times a part of psi_far, x from the near side:
- *   psi(x) = e^(-qx) psi_near + unit (sinh qx)/q (q - y) psi_far,   slope_near = q psi_near - unit (q - y)
+ * Any other layer, in its modes, cosh and sinh times unit: psi_near = m psi_far/unit. So a mode's source
+ * and slope are rows times psi_far = m^-1 unit psi_near, over its own unit: harmless if that is 1, or the
+ * largest, as of the slowest mode. Other modes are the sum of e^(-qx) psi_near, x from the near side, and
+ * what the far side causes:
+ *   psi(x) = e^(-qx) psi_near + unit (sinh qx)/q (q - y) psi_far,   slope = q psi_near - unit (q - y)
  * psi_far.
  */
-static void pass_thick(const struct mode_layer *layer, const struct crossing x[N], struct dual near_beam,
-                       struct dual far_beam, struct front *front)
+static void pass_thick(const struct slab *slab, const struct mode_layer *layer, const struct crossing x[N],
+                       struct dual near_beam, struct dual far_beam, struct front *front)
 {
     const struct matrix back = transpose(&layer->basis);
     struct matrix y = product(&front->y, &layer->basis);
     y = product(&back, &y);
     row_turn(front->c, &layer->basis);
-    /* of each mode: slope and source by psi_far, as one + by_y y; and by psi_near */
-    struct dual cosh[N], sinh[N], slope_one[N], slope_y[N], source_one[N], source_y[N];
-    struct dual slope_near[N], source_near[N];
-    for (int j = 0; j < N; j++) {
-        const struct dual near = multiply(layer->source[j], near_beam),
-                          far = multiply(layer->source[j], far_beam);
-        cosh[j] = x[j].cosh;
-        sinh[j] = x[j].sinh;
-        if (x[j].unit.v == 1.0) {
-            slope_one[j] = multiply(x[j].q2, x[j].sinh);
-            slope_y[j] = x[j].cosh;
-            source_one[j] = add(multiply(near, x[j].near_cosh), multiply(far, x[j].far_cosh));
-            source_y[j] = add(multiply(near, x[j].near_sinh), multiply(far, x[j].far_sinh));
-            slope_near[j] = source_near[j] = constant(0.0);
-        } else {
-            const struct dual q = root(x[j].q2);
-            slope_one[j] = scale(-1.0, multiply(x[j].unit, q));
-            slope_y[j] = x[j].unit;
-            source_y[j] = scale(-1.0, add(multiply(near, x[j].far_sinh), multiply(far, x[j].near_sinh)));
-            source_one[j] = scale(-1.0, multiply(q, source_y[j]));
-            slope_near[j] = q;
-            source_near[j] = add(multiply(near, add(x[j].near_cosh, multiply(q, x[j].near_sinh))),
-                                 multiply(far, add(x[j].far_cosh, multiply(q, x[j].far_sinh))));
+    /* of each mode, by psi_far and by psi_near: slope, and source of the slowest and of the others */
+    struct matrix m, slope;
+    struct dual slope_near[N], source_near[N], source_slow[N], over_slowest[N];
+    for (int i = 0; i < N; i++) {
+        const bool is_slow = i == 0 || x[i].unit.v == 1.0;
+        const struct dual near = multiply(layer->source[i], near_beam),
+                          far = multiply(layer->source[i], far_beam);
+        const struct dual q = root(x[i].q2), minus_unit = scale(-1.0, x[i].unit);
+        struct dual slope_one = multiply(x[i].q2, x[i].sinh), slope_y = x[i].cosh;
+        struct dual source_one = add(multiply(near, x[i].near_cosh), multiply(far, x[i].far_cosh));
+        struct dual source_y = add(multiply(near, x[i].near_sinh), multiply(far, x[i].far_sinh));
+        slope_near[i] = source_near[i] = constant(0.0);
+        if (!is_slow) {
+            source_near[i] = add(source_one, multiply(q, source_y));
+            slope_near[i] = q;
+            slope_one = multiply(q, minus_unit);
+            slope_y = x[i].unit;
+            source_y = scale(-1.0, add(multiply(near, x[i].far_sinh), multiply(far, x[i].near_sinh)));
+            source_one = scale(-1.0, multiply(q, source_y));
         }
+        struct dual *const source = i == 0 ? source_slow : front->c;
+        for (int j = 0; j < N; j++) {
+            const struct dual one = constant(i == j), y_ij = y.at[i][j];
+            m.at[i][j] = add(multiply(one, x[i].cosh), multiply(x[i].sinh, y_ij));
+            slope.at[i][j] = add(multiply(one, slope_one), multiply(slope_y, y_ij));
+            const struct dual source_ij = add(multiply(one, source_one), multiply(source_y, y_ij));
+            source[j] = i == 0 ? source_ij : add(source[j], source_ij);
+        }
+        over_slowest[i] = size(x[0].unit.v) > 1e-200
+                              ? divide(x[i].unit, x[0].unit)
+                              : decay(multiply(subtract(q, root(x[0].q2)), slab->thickness));
     }
-    struct matrix m = rows_scaled(sinh, &y), slope = rows_scaled(slope_y, &y);
-    diagonal_add(&m, cosh);
-    diagonal_add(&slope, slope_one);
-    row_turn(source_y, &y);
-    row_add(front->c, source_one);
-    row_add(front->c, source_y);
 
     struct dual determinant;
-    struct matrix over_m = inverse(&m, &determinant);
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            over_m.at[i][j] = multiply(over_m.at[i][j], x[j].unit);
+    const struct matrix over_m = inverse(&m, &determinant);
     /* for k^2 < 0 only the slowest mode may oscillate, and then its unit is e^(-i angle) */
     const bool is_turning = cimag(x[0].unit.v) != 0.0;
     front->is_regular =
         front->is_regular && creal(is_turning ? determinant.v * conj(x[0].unit.v) : determinant.v) > 0.0;
     y = product(&slope, &over_m);
-    diagonal_add(&y, slope_near);
+    row_turn(front->c, &over_m);
+    row_turn(source_slow, &over_m);
+    for (int j = 0; j < N; j++) {
+        for (int i = 0; i < N; i++)
+            y.at[i][j] = multiply(y.at[i][j], i == 0 ? over_slowest[j] : x[j].unit);
+        y.at[j][j] = add(y.at[j][j], slope_near[j]);
+        front->c[j] = add(multiply(front->c[j], x[j].unit),
+                          add(multiply(source_slow[j], over_slowest[j]), source_near[j]));
+    }
     y = product(&y, &back);
     front->y = product(&layer->basis, &y);
-    row_turn(front->c, &over_m);
-    row_add(front->c, source_near);
     row_turn(front->c, &back);
 }
 
@@ -512,7 +518,7 @@ static struct dual leaving(const struct system *system, const struct frequency *
         if (x[0].unit.v == 1.0 && x[1].unit.v == 1.0 && x[2].unit.v == 1.0)
             pass_thin(layer, x, near, far, &front);
         else
-            pass_thick(layer, x, near, far, &front);
+            pass_thick(slab, layer, x, near, far, &front);
     }
     struct dual determinant, sum_out = constant(0.0);
     diagonal_add(&front.y, z);

@@ -17,9 +17,10 @@ static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
 
 /* ---- what must hold for any stack ------------------------------------------------------------------ */
 
-/* Never NaN, infinite or negative; falling with distance; the parts add up. What is 1e-13 of the whole is
+/* Never NaN, infinite or negative; falling with distance; the parts add up. What is `slack` of the whole is
  * as good as nothing. */
-static void check_face(const dipole_stack *stack, dipole_face face, struct rng *rng, int number)
+static void check_face(const dipole_stack *stack, dipole_face face, double slack, struct rng *rng,
+                       int number)
 {
     const double total = dipole_stack_total(stack, face), top = profile(stack, face, 0.0);
     double floor_mm =
@@ -33,14 +34,14 @@ static void check_face(const dipole_stack *stack, dipole_face face, struct rng *
         const double value = profile(stack, face, r), within = dipole_stack_within(stack, face, r),
                      beyond = dipole_stack_beyond(stack, face, r),
                      ring = dipole_stack_ring_mean_per_mm2(stack, face, r, r * 1.5);
-        if (!is_sound(value) || value > last * (1.0 + 1e-9) + 1e-13 * top + least)
+        if (!is_sound(value) || value > last * (1.0 + 1e-9) + slack * top + least)
             failed("stack %d, face %d, r %.17g: profile %.17g after %.17g", number, (int)face, r, value,
                    last);
         if (!is_sound(within) || !is_sound(beyond) || fabs(within + beyond - total) > 1e-14 * total ||
-            within < last_within * (1.0 - 1e-9) - 1e-13 * total - least)
+            within < last_within * (1.0 - 1e-9) - slack * total - least)
             failed("stack %d, face %d, r %.17g: within %.17g after %.17g, beyond %.17g", number, (int)face,
                    r, within, last_within, beyond);
-        if (!is_sound(ring) || (r >= floor_mm && ring > value * (1.0 + 1e-9) + 1e-12 * top + least))
+        if (!is_sound(ring) || (r >= floor_mm && ring > value * (1.0 + 1e-9) + 10.0 * slack * top + least))
             failed("stack %d, face %d, r %.17g: ring mean %.17g, inner edge %.17g, outer %.17g", number,
                    (int)face, r, ring, value, profile(stack, face, 1.5 * r));
         last = value, last_within = within;
@@ -62,7 +63,7 @@ static void check_gradients(const dipole_stack *stack, dipole_face face, struct 
 }
 
 static void check_stack(const dipole_layer *layers, size_t count, dipole_model model, dipole_side side,
-                        struct rng *rng, int number)
+                        double slack, struct rng *rng, int number)
 {
     dipole_stack *stack;
     dipole_status status;
@@ -74,7 +75,7 @@ static void check_stack(const dipole_layer *layers, size_t count, dipole_model m
     for (int f = 0; f < 2; f++) {
         const dipole_face face = (dipole_face)f;
         sum += dipole_stack_total(stack, face) + dipole_stack_unscattered(stack, face);
-        check_face(stack, face, rng, number);
+        check_face(stack, face, slack, rng, number);
         if (number % 8 == 0)
             check_gradients(stack, face, rng, number);
     }
@@ -85,15 +86,36 @@ static void check_stack(const dipole_layer *layers, size_t count, dipole_model m
 
 void sweep_layers(int count)
 {
-    struct rng rng = { .seed = 111 };
-    for (int i = 0; i < count; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        const size_t layer_count = random_layers(&rng, layers);
-        const bool is_finite = isfinite(layers[layer_count - 1].thickness_mm);
-        check_stack(layers, layer_count, DIPOLE_MODEL_BEAM,
-                    is_finite && i % 2 ? DIPOLE_FROM_BELOW : DIPOLE_FROM_ABOVE, &rng, i);
+    /* Of these models only the beam's profile falls in any stack: the others' formulas give something
+     * negative between very unequal layers (T25, T29), which is cut off. The multipole's source must lie
+     * within the layer. */
+    static const struct {
+        dipole_model model;
+        double slack;
+        int divisor; /* of the count */
+        const char *name, *held;
+    } sweeps[] = {
+        { DIPOLE_MODEL_BEAM, 1e-13, 1, "beam, 1 to 10 layers", "the same, to 1e-13 of the whole" },
+        { DIPOLE_MODEL_MODES, 1.0, 4, "modes, 1 to 10 layers",
+          "never NaN, infinite or negative; within + beyond = total; energy ≤ 1" },
+        { DIPOLE_MODEL_MULTIPOLE, 1.0, 4, "multipole, 1 to 10 layers", "the same" },
+    };
+    for (size_t m = 0; m < sizeof sweeps / sizeof *sweeps; m++) {
+        struct rng rng = { .seed = 111 };
+        for (int i = 0; i < count / sweeps[m].divisor; i++) {
+            dipole_layer layers[RANDOM_LAYERS];
+            const size_t layer_count = random_layers(&rng, layers);
+            const bool is_finite = isfinite(layers[layer_count - 1].thickness_mm);
+            for (size_t k = 0; sweeps[m].model == DIPOLE_MODEL_MULTIPOLE && k < layer_count; k++)
+                layers[k].thickness_mm =
+                    fmax(layers[k].thickness_mm,
+                         1.01 / (layers[k].medium.sigma_a_per_mm + layers[k].medium.sigma_s_prime_per_mm));
+            check_stack(layers, layer_count, sweeps[m].model,
+                        is_finite && i % 2 ? DIPOLE_FROM_BELOW : DIPOLE_FROM_ABOVE, sweeps[m].slack, &rng,
+                        i);
+        }
+        printf("| %s | %d | %s |\n", sweeps[m].name, 50 * (count / sweeps[m].divisor), sweeps[m].held);
     }
-    printf("| beam, 1 to 10 layers | %d | the same, to 1e-13 of the whole |\n", 50 * count);
 }
 
 /* ---- against MPFR ---------------------------------------------------------------------------------- */

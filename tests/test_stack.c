@@ -618,7 +618,7 @@ static void bad_stacks_are_refused(void **state)
         { &thin, 1, DIPOLE_MODEL_MULTIPOLE, DIPOLE_NOT_SUPPORTED,
           "layers[0] is 0.5 mm thick, and the source of the multipole lies 1 mm deep, below it; expected a "
           "thicker "
-          "layer, or the model \"beam\", which has no limit" },
+          "layer, or the model \"beam\" or \"modes\", which have no limit" },
         { many, 1, (dipole_model)9, DIPOLE_BAD_VALUE, "model is 9, expected a dipole_model" },
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
