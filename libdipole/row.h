@@ -37,7 +37,7 @@ void dipole_row_beam_fill(const dipole_coefficients *coefficients, double *depth
 
 /* alpha'/(2 pi) sum_k w_k lobe, to a few units in the last place; NaN where r_mm is negative or NaN. */
 double dipole_row_value(const struct row *row, double r_mm);
-/* The same at count radii; of a row of two with a relative error of 3e-16 (8 + sigma_tr r), and faster. */
+/* The same of a row of two at count radii, faster, with a relative error of 3e-16 (8 + sigma_tr r). */
 void dipole_row_profile(const struct row *row, const double *r_mm, size_t count, double *values);
 /* The same, and its derivatives with respect to log sigma_a and log sigma_s'; weights and depth/l held. */
 void dipole_row_gradient(const struct row *row, const double *r_mm, size_t count, double *values,

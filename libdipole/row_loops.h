@@ -101,8 +101,8 @@ static inline double pair_value(const struct pair *pair, double r_mm)
     return MULTIPLY_ADD(a, b3, b * a3) / (a3 * b3);
 }
 
-static void pair_profile(const struct row *row, const double *restrict r_mm, size_t count,
-                         double *restrict values)
+static void profile(const struct row *row, const double *restrict r_mm, size_t count,
+                    double *restrict values)
 {
     const struct pair pair = pair_of(row);
     const double scale = row->coefficients->alpha_prime / (2.0 * PI);
@@ -112,16 +112,6 @@ static void pair_profile(const struct row *row, const double *restrict r_mm, siz
         for (size_t i = 0; i < count; i++)
             if (!(r_mm[i] >= 0.0 && r_mm[i] <= pair.r_end))
                 values[i] = value(row, r_mm[i]);
-}
-
-static void profile(const struct row *row, const double *r_mm, size_t count, double *values)
-{
-    if (row->count == 2) {
-        pair_profile(row, r_mm, count, values);
-        return;
-    }
-    for (size_t i = 0; i < count; i++)
-        values[i] = value(row, r_mm[i]);
 }
 
 /* ---- derivatives (T12) ---------------------------------------------------------------------------- */
