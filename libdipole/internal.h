@@ -86,7 +86,7 @@ struct system {
     double a_top, a_bottom;
     size_t count;
     bool is_half_space;
-    struct dual unscattered[2]; /* of the beam, by dipole_face */
+    struct dual unscattered[2];                /* of the beam, by dipole_face */
     double multipole_a[DIPOLE_LAYER_LIMIT][2]; /* A of both faces of each layer (models.c). T25 */
     struct mode_layer mode_layers[DIPOLE_LAYER_LIMIT];
     struct mode_face mode_faces[2]; /* by dipole_face */
