@@ -2,7 +2,9 @@
 
 #include "io/file.h"
 #include "io/material_file.h"
+#include "tests/reference_file.h"
 
+#include <ctype.h>
 #include <dirent.h>
 #include <stdlib.h>
 #include <string.h>
@@ -85,6 +87,43 @@ static void jensen_materials_have_the_measured_reflectance(void **state)
 {
     (void)state;
     json_count(SOURCE_FOLDER "/materials", expect_measured_reflectance);
+}
+
+/* Oracle: the published coefficients, in other people's programs; tests/reference/jensen2001.csv and
+ * narasimhan2006.csv. A file is named as its material, in small letters. */
+static void check_published(const char *table, const char *folder, int row_count)
+{
+    struct reference_file rows;
+    int count = 0;
+    reference_open(&rows, table);
+    while (reference_next(&rows)) {
+        char path[512];
+        struct io_material material;
+        size_t used = (size_t)snprintf(path, sizeof path, "%s", folder);
+        for (const char *p = reference_text(&rows, "material"); *p; p++)
+            if (isalnum((unsigned char)*p))
+                path[used++] = (char)tolower((unsigned char)*p);
+            else if (path[used - 1] != '_')
+                path[used++] = '_';
+        strcpy(path + used - (path[used - 1] == '_'), ".json");
+        assert_true(io_material_read(path, &material, NULL));
+        const size_t c = strcspn("RGB", reference_text(&rows, "channel"));
+        const dipole_medium *const medium = &material.layers[c][0].medium;
+        if (medium->sigma_a_per_mm != reference_number(&rows, "sigma_a_per_mm") ||
+            medium->sigma_s_prime_per_mm != reference_number(&rows, "sigma_sp_per_mm") ||
+            medium->eta != reference_number(&rows, "eta"))
+            fail_msg("%s %s: sigma_a %g, sigma_s' %g, eta %g", path, io_channel_names[c],
+                     medium->sigma_a_per_mm, medium->sigma_s_prime_per_mm, medium->eta);
+        count++;
+    }
+    assert_int_equal(count, row_count);
+}
+
+static void materials_are_the_published_ones(void **state)
+{
+    (void)state;
+    check_published("jensen2001.csv", SOURCE_FOLDER "/materials/", 36);
+    check_published("narasimhan2006.csv", SOURCE_FOLDER "/materials/narasimhan2006/", 105);
 }
 
 /* ---- what is read ---------------------------------------------------------------------------------- */
@@ -631,6 +670,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_bundled_material_is_read),
         cmocka_unit_test(jensen_materials_have_the_measured_reflectance),
+        cmocka_unit_test(materials_are_the_published_ones),
         cmocka_unit_test(scattering_with_g_is_reduced),
         cmocka_unit_test(failures_name_key_value_and_range),
         cmocka_unit_test(failures_in_layers_name_the_layer),
