@@ -24,13 +24,13 @@ echo '[       OK ] what the README links to exists'
 
 # a window needs a display: test_window has that
 grep '^    build/release/bin/' README.md | grep -v -e '--view' >"$work/examples"
-ln -s "$source_folder/materials" "$source_folder/scenes" "$work/"
+ln -s "$source_folder/materials" "$source_folder/scenes" "$source_folder/tests" "$work/"
 cd "$work"
 while read -r example; do
     sh -c "$(printf '%s' "$example" | sed "s|build/release/bin|$programs|")" >log 2>&1 </dev/null ||
         { echo "[  FAILED  ] $example"; cat log; exit 1; }
 done <examples
-for file in marble.svg models.svg tables/marble.splat1d.exr knot.png knot.exr found.json; do
+for file in marble.svg models.svg skin.svg tables/marble.splat1d.exr knot.png knot.exr found.json; do
     [ -s "$file" ] || { echo "[  FAILED  ] the README's examples made no $file"; exit 1; }
 done
 echo "[       OK ] the README's examples run"
