@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MODEL_LIMIT = 4 };
+enum { MODEL_LIMIT = 5 };
 
 struct options {
     struct cli_common common;
@@ -44,10 +44,11 @@ static bool add_model(struct options *options, const char *name, size_t length, 
            (strlen(io_model_names[model]) != length || strncmp(io_model_names[model], name, length) != 0))
         model++;
     if (!io_model_names[model])
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
-                           "--model has \"%.*s\", expected dipole, better_dipole, multipole or beam, with "
-                           "commas between",
-                           (int)(length < 100 ? length : 100), name);
+        return dipole_fail(
+            status, DIPOLE_BAD_VALUE, NULL,
+            "--model has \"%.*s\", expected dipole, better_dipole, multipole, beam or modes, "
+            "with commas between",
+            (int)(length < 100 ? length : 100), name);
     for (size_t i = 0; i < options->model_count; i++)
         if (options->models[i] == (dipole_model)model)
             return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "--model has \"%s\" twice",
@@ -239,7 +240,7 @@ int main(int argc, char **argv)
           .target = &options.model_lists,
           .argument = "NAME,...",
           .help = "Show the materials by these models in place of their own, with the same coefficients: "
-                  "dipole, better_dipole, multipole, beam; may be repeated." },
+                  "dipole, better_dipole, multipole, beam, modes; may be repeated." },
         { .name = "lit-from",
           .kind = CLI_CHOICE,
           .target = &options.side,

@@ -12,11 +12,11 @@ const char *const io_channel_names[IO_CHANNEL_COUNT] = { "R", "G", "B" };
 static const char *const fdr_names[] = {
     [DIPOLE_FDR_EXACT] = "exact", [DIPOLE_FDR_POLYNOMIAL] = "polynomial", NULL
 };
-const char *const io_model_names[] = { [DIPOLE_MODEL_DIPOLE] = "dipole",
-                                       [DIPOLE_MODEL_BETTER_DIPOLE] = "better_dipole",
-                                       [DIPOLE_MODEL_MULTIPOLE] = "multipole",
-                                       [DIPOLE_MODEL_BEAM] = "beam",
-                                       NULL };
+const char *const io_model_names[] = {
+    [DIPOLE_MODEL_DIPOLE] = "dipole",       [DIPOLE_MODEL_BETTER_DIPOLE] = "better_dipole",
+    [DIPOLE_MODEL_MULTIPOLE] = "multipole", [DIPOLE_MODEL_BEAM] = "beam",
+    [DIPOLE_MODEL_MODES] = "modes",         NULL
+};
 
 static const char infinite[] = "infinite", layers_key[] = "layers";
 
@@ -121,10 +121,11 @@ static bool find_inverse(const struct medium_source *source, dipole_model *model
 {
     const struct io_json reflectance = io_json_member(source->at, reflectance_key);
     *model_out = source->model == DIPOLE_MODEL_MULTIPOLE ? DIPOLE_MODEL_DIPOLE : source->model;
-    return source->model != DIPOLE_MODEL_BETTER_DIPOLE ||
+    return *model_out == DIPOLE_MODEL_DIPOLE || *model_out == DIPOLE_MODEL_BEAM ||
            io_json_fail(&reflectance, DIPOLE_NOT_SUPPORTED, status,
-                        "stands beside the model \"better_dipole\", which has no inverse, expected "
-                        "coefficients, or another model");
+                        "stands beside the model \"%s\", which has no inverse, expected coefficients, or "
+                        "another model",
+                        io_model_names[source->model]);
 }
 
 /* Say what the library found wrong at the key that it is about, its message beginning with the name of the
@@ -330,9 +331,9 @@ static bool read_layers(const struct io_json *at, dipole_fdr_kind fdr_kind, stru
             return io_json_fail(&member, DIPOLE_BAD_VALUE, status,
                                 "stands beside layers, expected either layers or one medium");
     }
-    if (material->model != DIPOLE_MODEL_BEAM && material->model != DIPOLE_MODEL_MULTIPOLE)
+    if (material->model == DIPOLE_MODEL_DIPOLE || material->model == DIPOLE_MODEL_BETTER_DIPOLE)
         return io_json_fail(&model, DIPOLE_NOT_SUPPORTED, status,
-                            "is \"%s\", which knows only a half-space, expected \"beam\" or "
+                            "is \"%s\", which knows only a half-space, expected \"beam\", \"modes\" or "
                             "\"multipole\" beside layers",
                             io_model_names[material->model]);
     if (!io_json_check_array(&layers, 1, DIPOLE_LAYER_LIMIT, &material->layer_count, status))

@@ -234,7 +234,7 @@ typedef enum dipole_model {
     DIPOLE_MODEL_DIPOLE = 0,    /* Jensen et al. 2001; a half-space; T5                              */
     DIPOLE_MODEL_BETTER_DIPOLE, /* d'Eon 2012; a half-space; T24                                     */
     DIPOLE_MODEL_MULTIPOLE,     /* Donner and Jensen 2005; layers thicker than one mean free path; T25 */
-    DIPOLE_MODEL_BEAM,          /* extended source, partial-current boundary; any layers; T16, T17   */
+    DIPOLE_MODEL_BEAM,          /* extended source, partial-current boundary; any layers; T22, T23   */
     DIPOLE_MODEL_MODES,         /* three exponential modes, surfaces by Fresnel (fdr_kind is ignored); any
                                    layers; T29                                                       */
 } dipole_model;
@@ -274,10 +274,11 @@ DIPOLE_API const dipole_coefficients *dipole_stack_coefficients(const dipole_sta
 DIPOLE_API size_t dipole_stack_layer_count(const dipole_stack *stack);
 
 /* Part of the light that entered which leaves by a face after scattering, 0 to 1; the far face of a
- * half-space has 0. theory.md T6, T22 to T25. */
+ * half-space has 0. theory.md T6, T22 to T25, T29. */
 DIPOLE_API double dipole_stack_total(const dipole_stack *stack, dipole_face face);
 
-/* Part that leaves without scattering, straight through or mirrored inside. Beam model only, else 0. T23 */
+/* Part that leaves without scattering, straight through or mirrored inside. Models beam and modes only,
+ * else 0. T23 */
 DIPOLE_API double dipole_stack_unscattered(const dipole_stack *stack, dipole_face face);
 
 /* Spatial spectrum at k_per_mm (rad/mm, >= 0), the total at 0. T10, T22 to T25. */
@@ -289,8 +290,8 @@ DIPOLE_API double dipole_stack_spectrum(const dipole_stack *stack, dipole_face f
  *   r_mm     distances, >= 0; values is count doubles, NaN where r_mm is negative or NaN
  *   Relative error below 1e-9; of light through layers that let less than 1e-6 of it through, more: the
  * error is below 1e-15 of what a layer one mean free path thick would let through. The beam model has an
- * integrable logarithm at r = 0: below 1e-9 mean free paths of the thinnest-scattering layer the value
- * there is continued.
+ * integrable logarithm at r = 0, the modes an integrable 1/r: below 1e-9 mean free paths of the
+ * thinnest-scattering layer the value there is continued.
  */
 DIPOLE_API void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face,
                                              const double *r_mm, size_t count, double *values);

@@ -175,6 +175,8 @@ static void json_of_stacks_holds_what_the_library_says(void **state)
         { "layered/marble_slab", "beam", "above" },
         { "layered/marble_slab", "beam", "below" },
         { "layered/marble_slab", "multipole", "above" },
+        { "skin1", "modes", "above" },
+        { "layered/marble_slab", "modes", "below" },
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char path[4096];
@@ -182,7 +184,7 @@ static void json_of_stacks_holds_what_the_library_says(void **state)
         snprintf(path, sizeof path, MATERIALS "%s.json", cases[i].name);
         assert_true(io_material_read(path, &material, NULL));
         while (strcmp(io_model_names[material.model], cases[i].model) != 0)
-            material.model = (dipole_model)((material.model + 1) % 4);
+            material.model = (dipole_model)((material.model + 1) % 5);
         const bool is_above = strcmp(cases[i].side, "above") == 0;
         run_tool(&run, "dipole", path, "--json", "--model", cases[i].model, "--lit-from", cases[i].side);
         assert_done(&run);
@@ -606,14 +608,14 @@ static void what_models_and_data_cannot_do_is_named(void **state)
     run_tool(&run, "dipole", "layered/skin", "--model", "beam,dipole", "--plot", "p.svg");
     assert_failed(
         &run, 1,
-        "dipole: layered/skin: --model dipole: this model knows only a half-space, expected \"beam\" "
-        "or \"multipole\" for layers\n");
+        "dipole: layered/skin: --model dipole: this model knows only a half-space, expected \"beam\", "
+        "\"modes\" or \"multipole\" for layers\n");
     run_tool(&run, "dipole", "layered/skin", "--model", "multipole");
     assert_failed(
         &run, 1,
         "dipole: layered/skin: --model multipole: layers[0] is 0.1 mm thick, and the source of the "
-        "multipole lies 0.199601 mm deep, below it; expected a thicker layer, or the model \"beam\", "
-        "which has no limit\n");
+        "multipole lies 0.199601 mm deep, below it; expected a thicker layer, or the model \"beam\" "
+        "or \"modes\", which have no limit\n");
     run_tool(&run, "dipole", "marble", "--plot", "p.svg", "--data", "p.csv");
     assert_failed(&run, 1, "dipole: p.csv:3:3: rd_per_mm2 is \"x\", expected a number\n");
     run_tool(&run, "dipole", "marble", "--plot", "p.svg", "--data", "q.csv");
@@ -674,13 +676,13 @@ static void wrong_usage_is_explained(void **state)
     assert_failed(&run, 2, "dipole: --plot is \"marble.pdf\", expected a name that ends in .svg or .png\n");
     run_tool(&run, "dipole", "marble", "--model", "beam,cone");
     assert_failed(&run, 2,
-                  "dipole: --model has \"cone\", expected dipole, better_dipole, multipole or beam, with "
-                  "commas between\n");
+                  "dipole: --model has \"cone\", expected dipole, better_dipole, multipole, beam or modes, "
+                  "with commas between\n");
     run_tool(&run, "dipole", "marble", "--model", "beam,");
     assert_failed(
         &run, 2,
-        "dipole: --model has \"\", expected dipole, better_dipole, multipole or beam, with commas "
-        "between\n");
+        "dipole: --model has \"\", expected dipole, better_dipole, multipole, beam or modes, with "
+        "commas between\n");
     run_tool(&run, "dipole", "marble", "--model", "beam", "--model", "dipole,beam");
     assert_failed(&run, 2, "dipole: --model has \"beam\" twice\n");
     run_tool(&run, "dipole", "marble", "--lit-from", "behind");

@@ -108,7 +108,7 @@ static void profiles_agree_with_mpfr(void **state)
             if (!(total > least && top > least))
                 continue;
             const double width_mm = sqrt(total / top);
-            layers_spectrum_init(&spectrum, &oracle, 1e-7 / width_mm);
+            layers_spectrum_init(&spectrum, layers_oracle_response, &oracle, 1e-7 / width_mm);
             for (int j = 0; j < RADII; j++) {
                 const double r = width_mm * log_uniform(&rng, 1e-2, 30.0);
                 const double found = profile(stack, face, r),

@@ -187,7 +187,8 @@ static void failures_name_key_value_and_range(void **state)
         { HEAD SIGMAS ", \"fdr\": \"schlick\"}", DIPOLE_BAD_VALUE, 2, 78,
           "fdr is \"schlick\", expected \"exact\" or \"polynomial\"" },
         { HEAD SIGMAS ", \"model\": \"cone\"}", DIPOLE_BAD_VALUE, 2, 80,
-          "model is \"cone\", expected \"dipole\" or \"better_dipole\" or \"multipole\" or \"beam\"" },
+          "model is \"cone\", expected \"dipole\" or \"better_dipole\" or \"multipole\" or \"beam\" or "
+          "\"modes\"" },
         { HEAD "\"diffuse_reflectance\": [1, 1.5, 1], \"mean_free_path_mm\": [1, 1, 1]}", DIPOLE_BAD_VALUE,
           2, 28, "diffuse_reflectance[1] is 1.5, expected 0 to 1" },
         { HEAD "\"diffuse_reflectance\": [1, 0, 1], \"mean_free_path_mm\": [1, 1, -2]}", DIPOLE_BAD_VALUE,
@@ -219,6 +220,11 @@ static void failures_name_key_value_and_range(void **state)
                "[1, 1, 1]}",
           DIPOLE_NOT_SUPPORTED, 2, 50,
           "diffuse_reflectance stands beside the model \"better_dipole\", which has no inverse, expected "
+          "coefficients, or another model" },
+        { HEAD
+          "\"model\": \"modes\", \"diffuse_reflectance\": [1, 1, 1], \"mean_free_path_mm\": [1, 1, 1]}",
+          DIPOLE_NOT_SUPPORTED, 2, 42,
+          "diffuse_reflectance stands beside the model \"modes\", which has no inverse, expected "
           "coefficients, or another model" },
     };
     expect_failures(cases, sizeof cases / sizeof cases[0]);
@@ -279,16 +285,18 @@ static void failures_in_layers_name_the_layer(void **state)
         { HEAD SIGMAS ", \"layers\": [" LAYER("1") "]}", DIPOLE_BAD_VALUE, 2, 19,
           "sigma_a_per_mm stands beside layers, expected either layers or one medium" },
         { HEAD "\"model\": \"dipole\", \"layers\": [" LAYER("1") "]}", DIPOLE_NOT_SUPPORTED, 2, 10,
-          "model is \"dipole\", which knows only a half-space, expected \"beam\" or \"multipole\" beside "
+          "model is \"dipole\", which knows only a half-space, expected \"beam\", \"modes\" or "
+          "\"multipole\" beside "
           "layers" },
         { HEAD "\"model\": \"better_dipole\", \"layers\": [" LAYER("1") "]}", DIPOLE_NOT_SUPPORTED, 2, 10,
-          "model is \"better_dipole\", which knows only a half-space, expected \"beam\" or \"multipole\" "
+          "model is \"better_dipole\", which knows only a half-space, expected \"beam\", \"modes\" or "
+          "\"multipole\" "
           "beside layers" },
         { HEAD "\"model\": \"multipole\", \"layers\": [" LAYER("1") ",\n" LAYER("0.4") "]}",
           DIPOLE_NOT_SUPPORTED, 3, 18,
           "layers[1].thickness_mm (channel R) is 0.4 mm thick, and the source of the multipole lies "
-          "0.909091 mm deep, below it; expected a thicker layer, or the model \"beam\", which has no "
-          "limit" },
+          "0.909091 mm deep, below it; expected a thicker layer, or the model \"beam\" or \"modes\", which "
+          "have no limit" },
         { HEAD "\"layers\": [{\"thickness_mm\": 1, \"name\": 3, " SIGMAS "}]}", DIPOLE_BAD_VALUE, 2, 40,
           "layers[0].name is a number, expected a string" },
         { HEAD "\"layers\": [{\"thickness_mm\": 1, \"diffuse_reflectance\": [0, 1, 1], "

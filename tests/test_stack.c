@@ -611,11 +611,11 @@ static void bad_stacks_are_refused(void **state)
         { steep, 2, DIPOLE_MODEL_BEAM, DIPOLE_BAD_VALUE,
           "layers[1].eta is 15 times that of the layer above, expected 0.1 to 10" },
         { many, 2, DIPOLE_MODEL_DIPOLE, DIPOLE_NOT_SUPPORTED,
-          "this model knows only a half-space, expected \"beam\" or \"multipole\" for layers" },
+          "this model knows only a half-space, expected \"beam\", \"modes\" or \"multipole\" for layers" },
         { &thin, 1, DIPOLE_MODEL_MULTIPOLE, DIPOLE_NOT_SUPPORTED,
           "layers[0] is 0.5 mm thick, and the source of the multipole lies 1 mm deep, below it; expected a "
           "thicker "
-          "layer, or the model \"beam\", which has no limit" },
+          "layer, or the model \"beam\" or \"modes\", which have no limit" },
         { many, 1, (dipole_model)9, DIPOLE_BAD_VALUE, "model is 9, expected a dipole_model" },
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
