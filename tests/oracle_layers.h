@@ -325,7 +325,7 @@ static inline void layers_oracle_response(void *oracle, double k, double out[2])
 
 /* ---- profiles ------------------------------------------------------------------------------------- */
 
-enum { ORACLE_POINTS = 16, ORACLE_OCTAVES = 80 };
+enum { ORACLE_POINTS = 22, ORACLE_OCTAVES = 80 };
 
 /* R^ and T^ at k of what an oracle knows. */
 typedef void oracle_response(void *oracle, double k, double out[2]);

@@ -117,8 +117,8 @@ static void response_at(void *context, double k, double out[2])
     out[1] = creal(found[1].v);
 }
 
-/* Oracle: the responses, which the test above has checked, along the real k axis, where nothing is singular,
- * transformed to distances. Both faces to 1e-9 of the value at a hundredth of the width. */
+/* Oracle: the responses, which the test above has checked, along the real k axis, where nothing is
+ * singular, transformed to distances. Both faces to 1e-9 of the value at a hundredth of the width. */
 static void profiles_agree_with_the_transform_along_real_k(void **state)
 {
     (void)state;
@@ -490,8 +490,8 @@ static void profiles_of_common_layers_fall(void **state)
     assert_true(worst < 1e-4);
 }
 
-/* Oracle: order. Of layers of any kind, 6 % of the profiles do rise somewhere: the model's interfaces between
- * layers of very different sigma_t' do not keep what leaves positive. */
+/* Oracle: order. Of layers of any kind, 6 % of the profiles do rise somewhere: the model's interfaces
+ * between layers of very different sigma_t' do not keep what leaves positive. */
 static void profiles_of_any_layers_are_finite(void **state)
 {
     (void)state;
@@ -600,8 +600,8 @@ static void profile_gradients_are_the_slopes_of_the_profiles(void **state)
 /* ---- transport ------------------------------------------------------------------------------------ */
 
 /* Oracle: adding-doubling, half-spaces and slabs from one mean free path, alpha' from 0.9. Isotropic
- * scattering: R within 1.5 % and T within 2 %. With g = 0.8 and the same sigma_s' the truth itself is up to 4
- * % lower in half-spaces, which no model of sigma_s' can know. */
+ * scattering: R within 1.5 % and T within 2 %. With g = 0.8 and the same sigma_s' the truth itself is up to
+ * 4 % lower in half-spaces, which no model of sigma_s' can know. */
 static void totals_agree_with_adding_doubling(void **state)
 {
     (void)state;

@@ -361,8 +361,8 @@ static void half_space_totals_agree_with_adding_doubling(void **state)
 }
 
 /* Oracle: Monte Carlo profiles. Rings at 0.5, 1, 2, 5 and 10 mean free paths err as theory.md states,
- * within 1.5 of its percent: diffusion is 12 to 20 % high at 1 to 2 mean free paths and right from 5 on; the
- * modes are within 4 % there in half-spaces. */
+ * within 1.5 of its percent: diffusion is 12 to 20 % high at 1 to 2 mean free paths and right from 5 on;
+ * the modes are within 4 % there in half-spaces. */
 static void profiles_agree_with_monte_carlo_as_stated(void **state)
 {
     (void)state;
@@ -402,8 +402,8 @@ static void profiles_agree_with_monte_carlo_as_stated(void **state)
             if (strcmp(reference_text(&totals, "case"), cases[i].name) != 0)
                 continue;
             dipole_layer layers[10];
-            dipole_stack *const stack = stack_of(
-                layers, layers_parse(reference_text(&totals, "layers"), layers), cases[i].model);
+            dipole_stack *const stack =
+                stack_of(layers, layers_parse(reference_text(&totals, "layers"), layers), cases[i].model);
             double lo[5] = { 0 }, hi[5] = { 0 }, power[5] = { 0 }, last = 0.0;
             for (int pass = 0; pass < 2; pass++) { /* the bins end at 60 mean free paths */
                 char path[128];
