@@ -73,7 +73,7 @@ static double top_of(const dipole_stack *stack, dipole_face face)
 static void responses_agree_with_mpfr(void **state)
 {
     (void)state;
-    enum { CASES = 2500 / SLOWNESS };
+    enum { CASES = 2000 / SLOWNESS };
     static double errors[2 * CASES];
     size_t error_count = 0;
     struct rng rng = { .seed = 71 };
@@ -122,7 +122,7 @@ static void response_at(void *context, double k, double out[2])
 static void profiles_agree_with_the_transform_along_real_k(void **state)
 {
     (void)state;
-    enum { CASES = 300 / SLOWNESS, RADII = 4 };
+    enum { CASES = 200 / SLOWNESS, RADII = 4 };
     static double errors[2 * RADII * CASES];
     size_t error_count = 0;
     struct rng rng = { .seed = 72 };
