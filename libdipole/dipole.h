@@ -274,10 +274,11 @@ DIPOLE_API const dipole_coefficients *dipole_stack_coefficients(const dipole_sta
 DIPOLE_API size_t dipole_stack_layer_count(const dipole_stack *stack);
 
 /* Part of the light that entered which leaves by a face after scattering, 0 to 1; the far face of a
- * half-space has 0. theory.md T6, T22 to T25. */
+ * half-space has 0. theory.md T6, T22 to T25, T29. */
 DIPOLE_API double dipole_stack_total(const dipole_stack *stack, dipole_face face);
 
-/* Part that leaves without scattering, straight through or mirrored inside. Beam model only, else 0. T23 */
+/* Part that leaves without scattering, straight through or mirrored inside. Models beam and modes only,
+ * else 0. T23 */
 DIPOLE_API double dipole_stack_unscattered(const dipole_stack *stack, dipole_face face);
 
 /* Spatial spectrum at k_per_mm (rad/mm, >= 0), the total at 0. T10, T22 to T25. */
@@ -287,9 +288,9 @@ DIPOLE_API double dipole_stack_spectrum(const dipole_stack *stack, dipole_face f
  * Profile: power leaving per mm^2 at each of count radii, for one unit of power entering, in 1/mm^2.
  *
  *   r_mm     distances, >= 0; values is count doubles, NaN where r_mm is negative or NaN
- *   Of layers the error is below 1e-10 of the value at r = 0 (T26), of a half-space below 8 units in the
- * last place (T5, T22). The beam model has an integrable logarithm at r = 0: below 1e-9 of the shortest
- * mean free path the value there is continued.
+ *   Of layers the error is below 1e-10 of the value at r = 0, of the modes 1e-9 (T26, T29), of a half-space
+ * below 8 units in the last place (T5, T22). The beam model has an integrable logarithm at r = 0, the modes
+ * an integrable 1/r: below 1e-9 of the shortest mean free path the value there is continued.
  */
 DIPOLE_API void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face,
                                              const double *r_mm, size_t count, double *values);

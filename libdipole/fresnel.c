@@ -169,13 +169,13 @@ void dipole_fresnel_mean_inside(double eta, double cosine2_lo, double cosine2_hi
         *transmitted = moments.transmitted / width;
         return;
     }
-    /* mu on the dense side becomes sqrt(1 - eta^2 (1 - mu^2)) on the thin side; below the critical cosine
+    /* mu on the dense side becomes eta sqrt(mu^2 - critical^2) on the thin side; below the critical cosine
      * all is reflected */
     const double step = (eta - 1.0) * (eta + 1.0), eta2 = eta * eta, critical2 = step / eta2;
     *reflected = (fmin(cosine2_hi, critical2) - fmin(cosine2_lo, critical2)) / width;
     *transmitted = 0.0;
-    const double thin_lo = fmax(1.0 - eta2 * (1.0 - cosine2_lo), 0.0),
-                 thin_hi = fmax(1.0 - eta2 * (1.0 - cosine2_hi), 0.0);
+    const double thin_lo = eta2 * fmax(cosine2_lo - critical2, 0.0),
+                 thin_hi = eta2 * fmax(cosine2_hi - critical2, 0.0);
     if (thin_hi > thin_lo) {
         const struct moments moments = moments_of_range(step, thin_lo, thin_hi);
         *reflected += moments.reflected / (eta2 * width);

@@ -301,8 +301,9 @@ static inline void oracle_layer_fill(struct layers_oracle *o, size_t i, double k
 }
 
 /* R^(k), T^(k), k > 0; as k goes to 0 the totals. */
-static inline void layers_oracle_response(struct layers_oracle *o, double k, double out[2])
+static inline void layers_oracle_response(void *oracle, double k, double out[2])
 {
+    struct layers_oracle *const o = oracle;
     const size_t n = 2 * o->count - (o->is_half_space ? 1 : 0);
     oracle_precision_set(o, n, oracle_bits(o, k));
     for (size_t i = 0; i < o->count; i++)
@@ -324,11 +325,15 @@ static inline void layers_oracle_response(struct layers_oracle *o, double k, dou
 
 /* ---- profiles ------------------------------------------------------------------------------------- */
 
-enum { ORACLE_POINTS = 16, ORACLE_OCTAVES = 80 };
+enum { ORACLE_POINTS = 22, ORACLE_OCTAVES = 80 };
+
+/* R^ and T^ at k of what an oracle knows. */
+typedef void oracle_response(void *oracle, double k, double out[2]);
 
 /* R^ and T^ from k_lo on, each octave at Chebyshev's points. Below k_lo they are constant. */
 struct layers_spectrum {
-    struct layers_oracle *oracle;
+    oracle_response *response;
+    void *oracle;
     double k_lo;
     int octave_count;
     double values[2][ORACLE_OCTAVES][ORACLE_POINTS];
@@ -340,9 +345,10 @@ static inline double oracle_chebyshev(int i)
 }
 
 /* The octaves are solved as they are asked for. */
-static inline void layers_spectrum_init(struct layers_spectrum *s, struct layers_oracle *oracle,
+static inline void layers_spectrum_init(struct layers_spectrum *s, oracle_response *response, void *oracle,
                                         double k_lo)
 {
+    s->response = response;
     s->oracle = oracle;
     s->k_lo = k_lo;
     s->octave_count = 0;
@@ -356,8 +362,7 @@ static inline double layers_spectrum_at(struct layers_spectrum *s, int face, dou
     while (s->octave_count <= octave) {
         for (int i = 0; i < ORACLE_POINTS; i++) {
             double f[2];
-            layers_oracle_response(s->oracle,
-                                   ldexp(s->k_lo, s->octave_count) * (1.5 + 0.5 * oracle_chebyshev(i)), f);
+            s->response(s->oracle, ldexp(s->k_lo, s->octave_count) * (1.5 + 0.5 * oracle_chebyshev(i)), f);
             s->values[0][s->octave_count][i] = f[0];
             s->values[1][s->octave_count][i] = f[1];
         }

@@ -438,8 +438,9 @@ static inline mpfr_prec_t modes_bits(const struct modes_oracle *o, double k)
 }
 
 /* R^(k), T^(k), k > 0; as k goes to 0 the totals. */
-static inline void modes_oracle_response(struct modes_oracle *o, double k, double out[2])
+static inline void modes_oracle_response(void *oracle, double k, double out[2])
 {
+    struct modes_oracle *const o = oracle;
     const size_t count = o->beams.count, n = ORACLE_MODES * (2 * count - (o->beams.is_half_space ? 1 : 0));
     const mpfr_prec_t bits = modes_bits(o, k);
     o->unknowns = n;

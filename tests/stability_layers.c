@@ -184,7 +184,7 @@ static void compare_profiles(int count)
             if (!(total > least && top > least))
                 continue;
             const double width_mm = sqrt(total / top);
-            layers_spectrum_init(&spectrum, &oracle, 1e-7 / width_mm);
+            layers_spectrum_init(&spectrum, layers_oracle_response, &oracle, 1e-7 / width_mm);
             for (int j = 0; j < RADII; j++) {
                 const double r = width_mm * log_uniform(&rng, 1e-2, 30.0), found = profile(stack, face, r),
                              expected = layers_oracle_profile(&spectrum, f, r);

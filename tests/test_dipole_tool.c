@@ -228,6 +228,8 @@ static void json_of_stacks_holds_what_the_library_says(void **state)
         { "layered/marble_slab", "beam", "above" },
         { "layered/marble_slab", "beam", "below" },
         { "layered/marble_slab", "multipole", "above" },
+        { "skin1", "modes", "above" },
+        { "layered/marble_slab", "modes", "below" },
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char path[4096];

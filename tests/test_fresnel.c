@@ -1,6 +1,6 @@
 #include "reference_file.h"
 
-#include "libdipole/dipole.h"
+#include "libdipole/internal.h"
 
 #include <mpfr.h>
 
@@ -209,6 +209,41 @@ static void outside_the_range_is_nan(void **state)
     assert_true(isnan(dipole_fdr_polynomial(0.0)));
 }
 
+/* Oracle: the midpoint rule over one side of the critical cosine, in mu^2 = lo + (hi - lo) u^2 (3 - 2u);
+ * and means over neighbouring ranges add up to that over all. */
+static void means_over_ranges_agree_with_midpoints(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 6 };
+    double worst = 0.0;
+    for (int i = 0; i < 300; i++) {
+        const double eta = i % 3 == 0 ? 1.0 + log_uniform(&rng, 1e-9, 1e-2) : log_uniform(&rng, 0.1, 10.0);
+        const double edges[4] = { 0.0, uniform(&rng, 0.05, 0.35), uniform(&rng, 0.45, 0.9), 1.0 };
+        const double critical2 = fmax(0.0, (eta - 1.0) * (eta + 1.0) / (eta * eta));
+        double all[2] = { 0.0, 0.0 };
+        for (int range = 0; range < 3; range++) {
+            double reflected, transmitted;
+            dipole_fresnel_mean_inside(eta, edges[range], edges[range + 1], &reflected, &transmitted);
+            const double width = edges[range + 1] - edges[range];
+            all[0] += width * reflected;
+            all[1] += width * transmitted;
+            assert_close(reflected + transmitted, 1.0, 1e-12, "eta %.17g", eta);
+            const double lo = fmax(edges[range], critical2), hi = edges[range + 1];
+            double sum = 0.0;
+            for (int n = 0; lo < hi && n < 2000; n++) {
+                const double u = (n + 0.5) / 2000.0, mu2 = lo + (hi - lo) * u * u * (3.0 - 2.0 * u);
+                sum += 6.0 * u * (1.0 - u) / 2000.0 * (hi - lo) *
+                       (1.0 - dipole_fresnel_reflectance(1.0 / eta, sqrt(mu2)));
+            }
+            worst = fmax(worst, fabs(transmitted - sum / width));
+        }
+        assert_close(all[0], dipole_fdr_exact(eta), 1e-13, "eta %.17g", eta);
+        assert_close(all[1], dipole_fdt_exact(eta), 1e-13, "eta %.17g", eta);
+    }
+    print_message("  worst difference to midpoints %.1e\n", worst);
+    assert_true(worst < 1e-5);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -218,6 +253,7 @@ int main(void)
         cmocka_unit_test(diffuse_reflectance_agrees_with_high_precision),
         cmocka_unit_test(diffuse_reflectance_agrees_with_the_closed_form),
         cmocka_unit_test(polynomial_has_the_corrected_constant),
+        cmocka_unit_test(means_over_ranges_agree_with_midpoints),
         cmocka_unit_test(outside_the_range_is_nan),
     };
     return cmocka_run_group_tests_name("fresnel", tests, NULL, NULL);
