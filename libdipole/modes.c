@@ -11,7 +11,8 @@
  * slope is y times themselves, carried from face to face with the integral c of the source times them.
  *
  * y is an M-matrix: off its diagonal nothing is positive, and its inverse is not negative. So at real k
- * what leaves is a sum of positive terms, and there is no singularity while all q_j are real.
+ * what leaves is a sum of positive terms, and there is no singularity while all q_j are real and no face
+ * sends back more than it gets.
  *
  * Everything is a dual number: value and derivative with respect to one parameter.
  */
