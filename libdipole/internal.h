@@ -4,6 +4,7 @@
 
 #include "dual.h"
 #include "libdipole/dipole.h"
+#include "matrix.h"
 
 #include <complex.h>
 #include <math.h>
@@ -57,12 +58,6 @@ struct slab {
 };
 
 /* The modes of a layer (modes.c). T29 */
-enum { MODE_COUNT = 3 };
-
-struct matrix {
-    struct dual at[MODE_COUNT][MODE_COUNT]; /* row, column */
-};
-
 struct mode_layer {
     struct dual q2[MODE_COUNT];     /* q^2 of each at k = 0, ascending       */
     struct matrix basis;            /* column j: what mode j is in the psi_m */

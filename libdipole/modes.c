@@ -11,7 +11,8 @@
  * slope is y times themselves, carried from face to face with the integral c of the source times them.
  *
  * y is an M-matrix: off its diagonal nothing is positive, and its inverse is not negative. So at real k
- * what leaves is a sum of positive terms, and there is no singularity while all q_j are real.
+ * what leaves is a sum of positive terms, and there is no singularity while all q_j are real and no face
+ * sends back more than it gets.
  *
  * Everything is a dual number: value and derivative with respect to one parameter.
  */
@@ -28,87 +29,6 @@ static const double root_weight[N] = { 0.59398993115433436150, 4.0 / 3.0, 4.6764
 static const double flux_weight[N] = { 0.46764728357929645252, 1.0 / 3.0, 0.059398993115433436150 };
 /* The cosines, squared, that each mode stands for at a face: from 1 down, each as wide as 2 g mu. */
 static const double cosine2_edge[N + 1] = { 1.0, 0.50705648076625461750, 0.062612036321810173045, 0.0 };
-
-/* ---- matrices ------------------------------------------------------------------------------------- */
-
-static struct matrix product(const struct matrix *a, const struct matrix *b)
-{
-    struct matrix out;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            out.at[i][j] = add(multiply(a->at[i][0], b->at[0][j]),
-                               add(multiply(a->at[i][1], b->at[1][j]), multiply(a->at[i][2], b->at[2][j])));
-    return out;
-}
-
-static struct matrix transpose(const struct matrix *a)
-{
-    struct matrix out;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            out.at[i][j] = a->at[j][i];
-    return out;
-}
-
-static struct matrix sum(const struct matrix *a, const struct matrix *b)
-{
-    struct matrix out;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            out.at[i][j] = add(a->at[i][j], b->at[i][j]);
-    return out;
-}
-
-/* diag(a) m */
-static struct matrix rows_scaled(const struct dual a[N], const struct matrix *m)
-{
-    struct matrix out;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            out.at[i][j] = multiply(a[i], m->at[i][j]);
-    return out;
-}
-
-static void diagonal_add(struct matrix *m, const struct dual a[N])
-{
-    for (int i = 0; i < N; i++)
-        m->at[i][i] = add(m->at[i][i], a[i]);
-}
-
-/* row = row m */
-static void row_turn(struct dual row[N], const struct matrix *m)
-{
-    const struct dual old[N] = { row[0], row[1], row[2] };
-    for (int j = 0; j < N; j++)
-        row[j] = add(multiply(old[0], m->at[0][j]),
-                     add(multiply(old[1], m->at[1][j]), multiply(old[2], m->at[2][j])));
-}
-
-static void row_add(struct dual row[N], const struct dual other[N])
-{
-    for (int j = 0; j < N; j++)
-        row[j] = add(row[j], other[j]);
-}
-
-/* By cofactors: rows and columns of any sizes do each other no harm. */
-static struct matrix inverse(const struct matrix *m, struct dual *determinant)
-{
-    struct matrix out;
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++) {
-            const struct dual *const above = m->at[(j + 1) % N], *const below = m->at[(j + 2) % N];
-            const int left = (i + 1) % N, right = (i + 2) % N;
-            out.at[i][j] =
-                subtract(multiply(above[left], below[right]), multiply(above[right], below[left]));
-        }
-    *determinant = add(multiply(m->at[0][0], out.at[0][0]),
-                       add(multiply(m->at[0][1], out.at[1][0]), multiply(m->at[0][2], out.at[2][0])));
-    const struct dual one_over = divide(constant(1.0), *determinant);
-    for (int i = 0; i < N; i++)
-        for (int j = 0; j < N; j++)
-            out.at[i][j] = multiply(one_over, out.at[i][j]);
-    return out;
-}
 
 /* ---- once per system: the modes of a layer -------------------------------------------------------- */
 
@@ -327,6 +247,13 @@ struct front {
     bool is_regular;
 };
 
+/* V diag(a) V^T */
+static struct matrix of_modes(const struct mode_layer *layer, const struct dual a[N])
+{
+    const struct matrix back = transpose(&layer->basis), rows = rows_scaled(a, &back);
+    return product(&layer->basis, &rows);
+}
+
 /* The infinite base, where all decays downwards. */
 static struct front base_front(const struct slab *slab, const struct mode_layer *layer, double complex k2)
 {
@@ -338,8 +265,7 @@ static struct front base_front(const struct slab *slab, const struct mode_layer 
         front.c[j] = divide(multiply(layer->source[j], slab->down), add(q[j], slab->sigma_t_prime));
     }
     row_turn(front.c, &back);
-    front.y = rows_scaled(q, &back);
-    front.y = product(&layer->basis, &front.y);
+    front.y = of_modes(layer, q);
     return front;
 }
 
@@ -352,27 +278,20 @@ static void pass_thin(const struct mode_layer *layer, const struct crossing x[N]
                       struct dual far_beam, struct front *front)
 {
     const struct matrix back = transpose(&layer->basis);
-    struct matrix cosh_less_1, sinh, slope;
-    struct dual source[N], source_y[N];
+    const struct dual one = constant(1.0), ones[N] = { one, one, one };
+    struct dual cosh_less_1[N], sinh[N], q2_sinh[N], source[N], source_y[N];
     for (int j = 0; j < N; j++) {
-        const struct dual q2_sinh = multiply(x[j].q2, x[j].sinh);
-        const struct dual cosh_part = divide(multiply(q2_sinh, x[j].sinh), add(x[j].cosh, constant(1.0)));
-        for (int m = 0; m < N; m++) {
-            cosh_less_1.at[j][m] = multiply(cosh_part, back.at[j][m]);
-            sinh.at[j][m] = multiply(x[j].sinh, back.at[j][m]);
-            slope.at[j][m] = multiply(q2_sinh, back.at[j][m]);
-        }
+        sinh[j] = x[j].sinh;
+        q2_sinh[j] = multiply(x[j].q2, x[j].sinh);
+        cosh_less_1[j] = divide(multiply(q2_sinh[j], x[j].sinh), add(x[j].cosh, one));
         source[j] = multiply(layer->source[j],
                              add(multiply(near_beam, x[j].near_cosh), multiply(far_beam, x[j].far_cosh)));
         source_y[j] = multiply(layer->source[j],
                                add(multiply(near_beam, x[j].near_sinh), multiply(far_beam, x[j].far_sinh)));
     }
-    cosh_less_1 = product(&layer->basis, &cosh_less_1);
-    sinh = product(&layer->basis, &sinh);
-    slope = product(&layer->basis, &slope);
-    const struct matrix cosh_y = product(&cosh_less_1, &front->y), sinh_y = product(&sinh, &front->y);
-    const struct dual ones[N] = { { 1.0, 0.0 }, { 1.0, 0.0 }, { 1.0, 0.0 } };
-    struct matrix m = sum(&cosh_less_1, &sinh_y);
+    const struct matrix cosh_part = of_modes(layer, cosh_less_1), sinh_part = of_modes(layer, sinh);
+    const struct matrix cosh_y = product(&cosh_part, &front->y), sinh_y = product(&sinh_part, &front->y);
+    struct matrix m = sum(&cosh_part, &sinh_y), slope = of_modes(layer, q2_sinh);
     diagonal_add(&m, ones);
     slope = sum(&slope, &cosh_y);
     slope = sum(&slope, &front->y);
@@ -393,9 +312,8 @@ static void pass_thin(const struct mode_layer *layer, const struct crossing x[N]
  * Any other layer, in its modes, cosh and sinh times unit: psi_near = m psi_far/unit. So a mode's source
  * and slope are rows times psi_far = m^-1 unit psi_near, over its own unit: harmless if that is 1, or the
  * largest, as of the slowest mode. Other modes are the sum of e^(-qx) psi_near, x from the near side, and
- * what the far side causes:
- *   psi(x) = e^(-qx) psi_near + unit (sinh qx)/q (q - y) psi_far,   slope = q psi_near - unit (q - y)
- * psi_far.
+ * what the far side causes, with f = unit (q - y) psi_far:
+ *   psi(x) = e^(-qx) psi_near + f (sinh qx)/q,   slope_near = q psi_near - f.
  */
 static void pass_thick(const struct slab *slab, const struct mode_layer *layer, const struct crossing x[N],
                        struct dual near_beam, struct dual far_beam, struct front *front)
@@ -432,6 +350,7 @@ static void pass_thick(const struct slab *slab, const struct mode_layer *layer, 
             const struct dual source_ij = add(multiply(one, source_one), multiply(source_y, y_ij));
             source[j] = i == 0 ? source_ij : add(source[j], source_ij);
         }
+        /* unit over that of the slowest mode, where the quotient has not underflown to 0/0 */
         over_slowest[i] = size(x[0].unit.v) > 1e-200
                               ? divide(x[i].unit, x[0].unit)
                               : decay(multiply(subtract(q, root(x[0].q2)), slab->thickness));

@@ -122,7 +122,7 @@ static void response_at(void *context, double k, double out[2])
 static void profiles_agree_with_the_transform_along_real_k(void **state)
 {
     (void)state;
-    enum { CASES = 200 / SLOWNESS, RADII = 4 };
+    enum { CASES = 120 / SLOWNESS, RADII = 4 };
     static double errors[2 * RADII * CASES];
     size_t error_count = 0;
     struct rng rng = { .seed = 72 };
@@ -497,7 +497,7 @@ static void profiles_of_any_layers_are_finite(void **state)
     (void)state;
     struct rng rng = { .seed = 80 };
     int count_all = 0, count_rising = 0;
-    for (int i = 0; i < 600 / SLOWNESS; i++) {
+    for (int i = 0; i < 240 / SLOWNESS; i++) {
         dipole_layer layers[RANDOM_LAYERS];
         const size_t count = random_layers(&rng, layers);
         dipole_stack *const stack = stack_of(layers, count);
@@ -520,7 +520,7 @@ static void derivatives_of_any_layers_are_sound(void **state)
 {
     (void)state;
     struct rng rng = { .seed = 78 };
-    for (int i = 0; i < 300 / SLOWNESS; i++) {
+    for (int i = 0; i < 100 / SLOWNESS; i++) {
         dipole_layer layers[RANDOM_LAYERS];
         const size_t count = random_layers(&rng, layers);
         dipole_stack *const stack = stack_of(layers, count);
