@@ -95,7 +95,7 @@ void sweep_layers(int count)
         int divisor; /* of the count */
         const char *name, *held;
     } sweeps[] = {
-        { DIPOLE_MODEL_BEAM, 1e-13, 1, "beam, 1 to 10 layers", "the same, to 1e-13 of the whole" },
+        { DIPOLE_MODEL_BEAM, 1e-12, 1, "beam, 1 to 10 layers", "the same, to 1e-12 of the whole" },
         { DIPOLE_MODEL_MODES, 1.0, 4, "modes, 1 to 10 layers",
           "never NaN, infinite or negative; within + beyond = total; energy ≤ 1" },
         { DIPOLE_MODEL_MULTIPOLE, 1.0, 4, "multipole, 1 to 10 layers", "the same" },
