@@ -288,9 +288,10 @@ DIPOLE_API double dipole_stack_spectrum(const dipole_stack *stack, dipole_face f
  * Profile: power leaving per mm^2 at each of count radii, for one unit of power entering, in 1/mm^2.
  *
  *   r_mm     distances, >= 0; values is count doubles, NaN where r_mm is negative or NaN
- *   Of layers the error is below 1e-10 of the value at r = 0, of the modes 1e-9 (T26, T29), of a half-space
- * below 8 units in the last place (T5, T22). The beam model has an integrable logarithm at r = 0, the modes
- * an integrable 1/r: below 1e-9 of the shortest mean free path the value there is continued.
+ *   Of a half-space of the dipole the error is that of dipole_rd_profile_per_mm2(), of the beam model 8
+ * units in the last place (T22); of all else 1e-10 of the value at r = 0, of the modes 1e-9 (T26, T29). The
+ * beam model has an integrable logarithm at r = 0, the modes an integrable 1/r: below 1e-9 of the shortest
+ * mean free path the value there is continued.
  */
 DIPOLE_API void dipole_stack_profile_per_mm2(const dipole_stack *stack, dipole_face face,
                                              const double *r_mm, size_t count, double *values);

@@ -4,25 +4,16 @@
 #include "libdipole/internal.h"
 #include "oracle_layers.h"
 #include "random_layers.h"
-
-/* What is smaller is no number to be right about: it is near where doubles end. */
-static const double least = 1e-290;
-
-static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
-{
-    double value;
-    dipole_stack_profile_per_mm2(stack, face, &r_mm, 1, &value);
-    return value;
-}
+#include "stacks.h"
 
 /* ---- what must hold for any stack ------------------------------------------------------------------ */
 
-/* Never NaN, infinite or negative; falling with distance; the parts add up. What is 1e-12 of the whole is
+/* Never NaN, infinite or negative; falling with distance; the parts add up. What is 1e-13 of the whole is
  * as good as nothing. */
 static void check_face(const dipole_stack *stack, dipole_face face, bool is_ordered, struct rng *rng,
                        int number)
 {
-    const double slack = 1e-12;
+    const double slack = 1e-13;
     const double total = dipole_stack_total(stack, face), top = profile(stack, face, 0.0);
     /* below the floor the profile goes on as a constant, the power of a half-space does not */
     double floor_mm = INFINITY;
@@ -97,7 +88,7 @@ void sweep_layers(int count)
         int divisor; /* of the count */
         const char *name, *held;
     } sweeps[] = {
-        { DIPOLE_MODEL_BEAM, true, 1, "beam, 1 to 10 layers", "the same, to 1e-12 of the whole" },
+        { DIPOLE_MODEL_BEAM, true, 1, "beam, 1 to 10 layers", "the same, to 1e-13 of the whole" },
         { DIPOLE_MODEL_MODES, false, 4, "modes, 1 to 10 layers",
           "never NaN, infinite or negative; within + beyond = total; energy ≤ 1" },
         { DIPOLE_MODEL_MULTIPOLE, false, 4, "multipole, 1 to 10 layers", "the same" },

@@ -1,37 +1,11 @@
+/* The exponential modes (T29). What any model of layers must keep is in test_layers.c. */
 #include "libdipole/internal.h"
 #include "oracle_modes.h"
 #include "random_layers.h"
 #include "reference_file.h"
+#include "stacks.h"
 
 #include <stdlib.h>
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-enum { SLOWNESS = 20 }; /* how many times fewer cases */
-#else
-enum { SLOWNESS = 1 };
-#endif
-
-static dipole_stack *stack_of(const dipole_layer *layers, size_t count)
-{
-    dipole_stack *stack;
-    dipole_status status;
-    if (!dipole_stack_create(layers, count, DIPOLE_MODEL_MODES, DIPOLE_FROM_ABOVE, &stack, &status))
-        fail_msg("%s", status.message);
-    return stack;
-}
-
-static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
-{
-    double value;
-    dipole_stack_profile_per_mm2(stack, face, &r_mm, 1, &value);
-    return value;
-}
-
-static void coefficients_of(const dipole_layer *layers, size_t count, dipole_coefficients *coefficients)
-{
-    for (size_t i = 0; i < count; i++)
-        assert_true(dipole_coefficients_init(&layers[i].medium, &coefficients[i], NULL));
-}
 
 static void system_of(const dipole_layer *layers, size_t count, int parameter, struct system *system)
 {
@@ -49,23 +23,6 @@ static int by_value(const void *a, const void *b)
 
 static struct modes_oracle oracle;
 static struct layers_spectrum spectrum;
-
-/* What is smaller than this is no number to be right about: it is near where doubles end. */
-static const double least = 1e-290;
-
-/* Half of the power leaves within it. */
-static double half_width_mm(const dipole_stack *stack, dipole_face face)
-{
-    return dipole_stack_r_max_mm(stack, face, 0.5);
-}
-
-/* The profile at a hundredth of that, or its mean if that is more. */
-static double top_of(const dipole_stack *stack, dipole_face face)
-{
-    const double width_mm = half_width_mm(stack, face);
-    return fmax(profile(stack, face, 0.01 * width_mm),
-                dipole_stack_total(stack, face) / (2.0 * PI * width_mm * width_mm));
-}
 
 /* ---- against MPFR --------------------------------------------------------------------------------- */
 
@@ -130,7 +87,7 @@ static void profiles_agree_with_the_transform_along_real_k(void **state)
         dipole_layer layers[RANDOM_LAYERS];
         struct system system;
         const size_t count = random_layers(&rng, layers);
-        dipole_stack *const stack = stack_of(layers, count);
+        dipole_stack *const stack = stack_of(layers, count, DIPOLE_MODEL_MODES);
         system_of(layers, count, -1, &system);
         for (int f = 0; f < 2; f++) {
             const dipole_face face = (dipole_face)f;
@@ -377,40 +334,6 @@ static void responses_are_those_of_the_reference_program(void **state)
 
 /* ---- any layers ----------------------------------------------------------------------------------- */
 
-/* Oracle: conservation. What leaves is no more than what entered, and all of it where nothing absorbs. */
-static void energy_is_kept_by_any_layers(void **state)
-{
-    (void)state;
-    double worst = 0.0;
-    struct rng rng = { .seed = 75 };
-    for (int i = 0; i < 20000 / SLOWNESS; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        struct system system;
-        struct dual totals[2];
-        const size_t count = random_layers(&rng, layers);
-        const bool is_lossless = i % 3 == 0;
-        for (size_t k = 0; is_lossless && k < count; k++) {
-            layers[k].medium.sigma_s_prime_per_mm += layers[k].medium.sigma_a_per_mm;
-            layers[k].medium.sigma_a_per_mm = 0.0;
-        }
-        system_of(layers, count, -1, &system);
-        dipole_modes_solve(&system, 0.0, totals);
-        double sum = 0.0;
-        for (int face = 0; face < 2; face++) {
-            const double total = creal(totals[face].v), unscattered = creal(system.unscattered[face].v);
-            assert_true(cimag(totals[face].v) == 0.0);
-            assert_true(total >= 0.0 && total <= 1.0 + 1e-13);
-            sum += total + unscattered;
-        }
-        assert_true(sum <= 1.0 + 1e-12);
-        if (is_lossless) {
-            worst = fmax(worst, fabs(sum - 1.0));
-            assert_true(fabs(sum - 1.0) < 1e-12);
-        }
-    }
-    print_message("  worst loss without absorption %.1e\n", worst);
-}
-
 /* Oracle: continuity. On k^2 = -kappa^2 < 0 below the first singularity the response is real, positive and
  * does not jump: there are no poles in between that the search might have stepped over. */
 static void responses_are_regular_below_the_first_singularity(void **state)
@@ -479,7 +402,7 @@ static void profiles_of_common_layers_fall(void **state)
         }
         if (random_bits(&rng) % 2)
             layers[count - 1].thickness_mm = INFINITY;
-        dipole_stack *const stack = stack_of(layers, count);
+        dipole_stack *const stack = stack_of(layers, count, DIPOLE_MODEL_MODES);
         for (int f = 0; f < (isinf(layers[count - 1].thickness_mm) ? 1 : 2); f++) {
             const double rise = largest_rise(stack, (dipole_face)f, i);
             worst = fmax(worst, rise);
@@ -500,7 +423,7 @@ static void profiles_of_any_layers_are_finite(void **state)
     for (int i = 0; i < 240 / SLOWNESS; i++) {
         dipole_layer layers[RANDOM_LAYERS];
         const size_t count = random_layers(&rng, layers);
-        dipole_stack *const stack = stack_of(layers, count);
+        dipole_stack *const stack = stack_of(layers, count, DIPOLE_MODEL_MODES);
         for (int f = 0; f < 2; f++) {
             if (!(dipole_stack_total(stack, (dipole_face)f) > least))
                 continue;
@@ -511,90 +434,6 @@ static void profiles_of_any_layers_are_finite(void **state)
     }
     print_message("  %d of %d rise\n", count_rising, count_all);
     assert_true(count_rising < 0.1 * count_all + 3);
-}
-
-/* Oracle: dimensions. Totals do not change if all lengths are scaled, so their derivatives by log sigma_a
- * and log sigma_s' less those by log thickness sum to 0 over the layers; those of the profile are finite.
- */
-static void derivatives_of_any_layers_are_sound(void **state)
-{
-    (void)state;
-    struct rng rng = { .seed = 78 };
-    for (int i = 0; i < 100 / SLOWNESS; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        const size_t count = random_layers(&rng, layers);
-        dipole_stack *const stack = stack_of(layers, count);
-        for (int f = 0; f < 2; f++) {
-            const dipole_face face = (dipole_face)f;
-            double sum = 0.0, unit = 1e-300;
-            for (size_t k = 0; k < count; k++) {
-                const dipole_stack_gradient g = dipole_stack_total_gradient(stack, face, k);
-                sum += g.d_log_sigma_a + g.d_log_sigma_s_prime - g.d_log_thickness;
-                unit += fabs(g.d_log_sigma_a) + fabs(g.d_log_sigma_s_prime) + fabs(g.d_log_thickness);
-            }
-            if (!(fabs(sum) <= 1e-10 * (unit + dipole_stack_total(stack, face))))
-                fail_msg("case %d, face %d: sum %g of terms of %g", i, f, sum, unit);
-            const double l = dipole_stack_coefficients(stack, 0)->mean_free_path_mm;
-            const double radii[6] = { 0.0, 1e-9, 0.1 * l, 30.0 * l, 1e9, INFINITY };
-            dipole_stack_gradient gradients[6];
-            dipole_stack_profile_gradient(stack, face, random_bits(&rng) % count, radii, 6, gradients);
-            for (int j = 0; j < 6; j++)
-                assert_true(isfinite(gradients[j].d_log_sigma_a) &&
-                            isfinite(gradients[j].d_log_sigma_s_prime) &&
-                            isfinite(gradients[j].d_log_thickness));
-        }
-        dipole_stack_destroy(stack);
-    }
-}
-
-/* Oracle: central differences of profiles of both faces. */
-static void profile_gradients_are_the_slopes_of_the_profiles(void **state)
-{
-    (void)state;
-    struct rng rng = { .seed = 79 };
-    for (int i = 0; i < 60 / SLOWNESS; i++) {
-        dipole_layer layers[RANDOM_LAYERS];
-        const size_t count = random_layers(&rng, layers), at = random_bits(&rng) % count;
-        const int parameter = (int)(random_bits(&rng) % (isinf(layers[at].thickness_mm) ? 2 : 3));
-        dipole_stack *const stack = stack_of(layers, count), *sides[2];
-        for (int f = 0; f < 2; f++) {
-            const dipole_face face = (dipole_face)f;
-            const double total = dipole_stack_total(stack, face);
-            if (!(total > least))
-                continue;
-            const double fall = 1.0 - log(total), step = 1e-4 / fall, width_mm = half_width_mm(stack, face);
-            for (int side = 0; side < 2; side++) {
-                dipole_layer moved[RANDOM_LAYERS];
-                for (size_t k = 0; k < count; k++)
-                    moved[k] = layers[k];
-                double *const fields[3] = { &moved[at].medium.sigma_a_per_mm,
-                                            &moved[at].medium.sigma_s_prime_per_mm,
-                                            &moved[at].thickness_mm };
-                *fields[parameter] *= exp(side ? step : -step);
-                sides[side] = stack_of(moved, count);
-            }
-            double radii[5];
-            dipole_stack_gradient gradients[5];
-            for (int j = 0; j < 5; j++)
-                radii[j] = width_mm * log_uniform(&rng, 1e-2, 10.0);
-            const double top = top_of(stack, face);
-            dipole_stack_profile_gradient(stack, face, at, radii, 5, gradients);
-            for (int j = 0; j < 5; j++) {
-                const double found[3] = { gradients[j].d_log_sigma_a, gradients[j].d_log_sigma_s_prime,
-                                          gradients[j].d_log_thickness };
-                const double expected =
-                    (profile(sides[1], face, radii[j]) - profile(sides[0], face, radii[j])) / (2.0 * step);
-                if (!(fabs(found[parameter] - expected) <= 1e-7 * fall * top))
-                    fail_msg(
-                        "case %d, face %d, layer %zu of %zu, parameter %d, r %g: found %g, expected %g, "
-                        "top %g",
-                        i, f, at, count, parameter, radii[j], found[parameter], expected, top);
-            }
-            dipole_stack_destroy(sides[0]);
-            dipole_stack_destroy(sides[1]);
-        }
-        dipole_stack_destroy(stack);
-    }
 }
 
 /* ---- transport ------------------------------------------------------------------------------------ */
@@ -617,7 +456,7 @@ static void totals_agree_with_adding_doubling(void **state)
         if (sigma_s_prime / (sigma_s_prime + 1.0 - albedo) < 0.9 || slab.thickness_mm < 1.0 ||
             (g > 0.0 && !isinf(slab.thickness_mm)))
             continue;
-        dipole_stack *const stack = stack_of(&slab, 1);
+        dipole_stack *const stack = stack_of(&slab, 1, DIPOLE_MODEL_MODES);
         const double entered = 1.0 - pow((n - 1.0) / (n + 1.0), 2.0);
         const double expected[2] = {
             (reference_number(&rows, "R_total") - reference_number(&rows, "R_unscattered")) / entered,
@@ -646,12 +485,9 @@ int main(void)
         cmocka_unit_test(derivatives_agree_with_mpfr),
         cmocka_unit_test(half_spaces_have_their_closed_form),
         cmocka_unit_test(responses_are_those_of_the_reference_program),
-        cmocka_unit_test(energy_is_kept_by_any_layers),
         cmocka_unit_test(responses_are_regular_below_the_first_singularity),
         cmocka_unit_test(profiles_of_common_layers_fall),
         cmocka_unit_test(profiles_of_any_layers_are_finite),
-        cmocka_unit_test(derivatives_of_any_layers_are_sound),
-        cmocka_unit_test(profile_gradients_are_the_slopes_of_the_profiles),
         cmocka_unit_test(totals_agree_with_adding_doubling),
     };
     return cmocka_run_group_tests_name("modes", tests, NULL, NULL);

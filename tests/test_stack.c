@@ -1,31 +1,14 @@
 #include "reference_file.h"
-
-#include "libdipole/dipole.h"
+#include "stacks.h"
 
 #include <complex.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
 
-static dipole_stack *stack_of(const dipole_layer *layers, size_t count, dipole_model model)
-{
-    dipole_stack *stack;
-    dipole_status status;
-    if (!dipole_stack_create(layers, count, model, DIPOLE_FROM_ABOVE, &stack, &status))
-        fail_msg("%s", status.message);
-    return stack;
-}
-
 static dipole_layer layer(double sigma_a, double sigma_s_prime, double eta, double thickness_mm)
 {
     return (dipole_layer){ { sigma_a, sigma_s_prime, eta, DIPOLE_FDR_EXACT }, thickness_mm };
-}
-
-static double profile(const dipole_stack *stack, dipole_face face, double r_mm)
-{
-    double value;
-    dipole_stack_profile_per_mm2(stack, face, &r_mm, 1, &value);
-    return value;
 }
 
 /* Up to ten layers around one scale, thin to thick, over a finite or infinite base. */
@@ -361,7 +344,8 @@ static void half_space_totals_agree_with_adding_doubling(void **state)
     assert_true(count > 8);
 }
 
-/* Oracle: Monte Carlo profiles. Rings at 0.5, 1, 2, 5 and 10 mean free paths err as theory.md states,
+/* Oracle: Monte Carlo profiles. Rings at 0.5, 1, 2, 5 and 10 mean free paths err as
+ * docs/models.md states,
  * within 1.5 of its percent: diffusion is 12 to 20 % high at 1 to 2 mean free paths and right from 5 on;
  * the modes are within 4 % there in half-spaces. */
 static void profiles_agree_with_monte_carlo_as_stated(void **state)
