@@ -48,6 +48,22 @@ void lut_hash_material(uint64_t *hash, const struct io_material *material)
         }
 }
 
+struct lut_hash lut_request_hash(const struct lut_request *request)
+{
+    uint64_t hash = LUT_HASH_START;
+    lut_hash_text(&hash, lut_kind_names[request->kind]);
+    lut_hash_text(&hash, dipole_version());
+    lut_hash_text(&hash, request->is_half ? "half" : "float");
+    lut_hash_number(&hash, request->epsilon);
+    for (int i = 0; i < 3; i++)
+        lut_hash_number(&hash, request->size[i]);
+    for (size_t i = 0; i < request->material_count; i++) {
+        lut_hash_text(&hash, request->materials[i].name);
+        lut_hash_material(&hash, &request->materials[i]);
+    }
+    return lut_hash_print(hash);
+}
+
 struct lut_hash lut_hash_print(uint64_t hash)
 {
     struct lut_hash out;

@@ -18,6 +18,9 @@ double lut_half_scale(double max);
 /* The half nearest to value, ties to even; |value| at most 65504. */
 double lut_half_round(double value);
 
+/* What every kind asks of a request. */
+DIPOLE_CHECKED bool lut_request_check(const struct lut_request *request, dipole_status *status);
+
 /* ---- profiles (profile.c) ----------------------------------------------------------------------- */
 
 /* One channel of a material, as tables hold it. */
@@ -34,6 +37,10 @@ DIPOLE_CHECKED bool lut_profiles_init(const struct io_material *material, double
                                       struct lut_profile out[IO_CHANNEL_COUNT], dipole_status *status);
 void lut_profiles_end(struct lut_profile profiles[IO_CHANNEL_COUNT]);
 
+/* Fail where float cannot hold a profile with all its digits. */
+DIPOLE_CHECKED bool lut_profiles_check_range(const struct lut_profile profiles[IO_CHANNEL_COUNT],
+                                             dipole_status *status);
+
 /* R_d at count radii from 0 to whatever, in 1/mm^2. */
 void lut_profile_evaluate(const struct lut_profile *profile, const double *r_mm, size_t count,
                           double *values);
@@ -49,6 +56,49 @@ enum { AXIS_POINTS = 128 };
  */
 double lut_axis_find(const struct lut_profile profiles[IO_CHANNEL_COUNT], double log_range_limit,
                      struct lut_axis *axis_out, double *falloff_out);
+
+/* ---- attributes of files (attributes.c) ---------------------------------------------------------- */
+
+/* Attributes that are being set: the first failure ends the rest. */
+struct lut_writer {
+    struct io_image *image;
+    bool is_done;
+};
+void lut_put_text(struct lut_writer *writer, const char *name, const char *text);
+void lut_put_number(struct lut_writer *writer, const char *name, double value);
+void lut_put_numbers(struct lut_writer *writer, const char *name, const double values[3]);
+void lut_put_json(struct lut_writer *writer, const char *name, json_t *json); /* takes json; NULL fails */
+/* What every kind ends with: storage, version, hashes of the texels and of the inputs. */
+void lut_put_end(struct lut_writer *writer, const struct lut_request *request);
+/* A table's one material. */
+void lut_put_material(struct lut_writer *writer, const struct io_material *material);
+
+/* Attributes of a picture that was read, and where failures go. */
+struct lut_reader {
+    const struct io_image *image;
+    dipole_place place;
+    dipole_status *status;
+};
+bool lut_get_text(const struct lut_reader *reader, const char *name, const char **text_out);
+/* Which of choices, which end with NULL. */
+bool lut_get_choice(const struct lut_reader *reader, const char *name, const char *const *choices,
+                    int *out);
+bool lut_get_number(const struct lut_reader *reader, const char *name, double min, double max, double *out);
+bool lut_get_numbers(const struct lut_reader *reader, const char *name, double min, double max,
+                     double out[3]);
+/* The JSON of a text; end it with io_json_destroy. */
+bool lut_get_json(const struct lut_reader *reader, const char *name,
+                  struct io_json_document **document_out);
+
+/* Fail unless this version of the library wrote the file. */
+bool lut_check_version(const struct lut_reader *reader);
+
+/* Fail at the first texel that is not finite or below 0. */
+bool lut_check_texels(const struct lut_reader *reader, const float *texels, size_t count);
+
+/* Fail unless the file has every attribute that the table would be written with, and the same texels: so
+ * that nothing in it was changed without the rest. */
+bool lut_check_same(const struct lut_reader *reader, const struct io_image *expected);
 
 /* ---- hashes (hash.c): FNV-1a, 64 bit ------------------------------------------------------------- */
 

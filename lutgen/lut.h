@@ -26,6 +26,19 @@ struct lut_hash {
  * name. */
 struct lut_hash lut_material_hash(const struct io_material *material);
 
+/* What is asked of a bake. */
+struct lut_request {
+    enum lut_kind kind;
+    const struct io_material *materials;
+    size_t material_count; /* 1, but for splat2d */
+    double epsilon;        /* LUT_EPSILON_MIN to LUT_EPSILON_MAX */
+    int size[3];           /* texels; 0: chosen. Splat tables: size[0] nodes; tsm: S, T, R */
+    bool is_half;          /* texels are rounded to half; epsilon must then be above 4.9e-4 */
+};
+
+/* Of all that decides the bytes of the table: the request, the materials' names, the library's version. */
+struct lut_hash lut_request_hash(const struct lut_request *request);
+
 /* Largest relative error, and the one that 99 % of random points stay below. */
 struct lut_error {
     double max, p99;
@@ -61,9 +74,10 @@ struct lut_splat_row {
 
 /* End it with lut_splat_destroy. */
 struct lut_splat {
-    double epsilon; /* asked: relative error, and part of the light beyond r_max */
-    bool is_half;   /* every texel is a half                                     */
-    int node_count; /* of every row                                              */
+    double epsilon;       /* asked: relative error, and part of the light beyond r_max */
+    bool is_half;         /* every texel is a half                                     */
+    int node_count;       /* of every row                                              */
+    int node_count_asked; /* 0: the fewest */
     size_t row_count;
     struct lut_splat_row *rows;
     float *rgb; /* row_count x node_count x 3                                */
@@ -73,18 +87,14 @@ struct lut_splat {
 enum { LUT_NODE_COUNT_MIN = 8, LUT_NODE_COUNT_MAX = 32768, LUT_ROW_LIMIT = 1024 };
 
 /*
- * Bake a row for each material whose relative error is at most epsilon (1e-6 to 0.5) for every channel out
- * to r_max(epsilon) of that channel, with the fewest nodes that do it in every row. The error is relative
- * to R_d, and beyond a channel's own r_max to R_d there.
+ * Bake a row for each material whose relative error is at most epsilon for every channel out to
+ * r_max(epsilon) of that channel, with the fewest nodes that do it in every row, or with size[0] of them.
+ * The error is relative to R_d, and beyond a channel's own r_max to R_d there.
  *
- *   node_count   0: the fewest; else so many, and epsilon must hold with these
- *   is_half      texels are rounded to half; epsilon must then be above 4.9e-4
- *
- * Fails with DIPOLE_BAD_VALUE (naming the material), DIPOLE_NOT_CONVERGED, naming what was reached, or
- * DIPOLE_OUT_OF_MEMORY.
+ * Fails with DIPOLE_BAD_VALUE (naming the material, if there are several), DIPOLE_NOT_CONVERGED, naming
+ * what was reached, DIPOLE_NOT_SUPPORTED or DIPOLE_OUT_OF_MEMORY.
  */
-DIPOLE_CHECKED bool lut_splat_bake(const struct io_material *materials, size_t count, double epsilon,
-                                   int node_count, bool is_half, struct lut_splat **lut_out,
+DIPOLE_CHECKED bool lut_splat_bake(const struct lut_request *request, struct lut_splat **lut_out,
                                    dipole_status *status);
 void lut_splat_destroy(struct lut_splat *lut);
 
@@ -108,5 +118,74 @@ DIPOLE_CHECKED bool lut_splat_from_image(const struct io_image *image, const cha
 
 /* lut_splat_from_image of an EXR file. */
 DIPOLE_CHECKED bool lut_splat_read(const char *path, struct lut_splat **lut_out, dipole_status *status);
+
+/* ---- volumes for translucent shadow maps -------------------------------------------------------- */
+
+/*
+ * One of the places about a point where its light's view is sampled (Dachsbacher and Stamminger 2003,
+ * section 4): a cell of the plane across the light, whose mean flux a texel of the view's mip level
+ * log2(width_mm/texel width) holds.
+ */
+struct lut_tsm_sample {
+    double offset_mm[2]; /* from the point to the cell's centre: x_in - x_out along the view's axes */
+    double width_mm;     /* of a square as large as the cell                                        */
+    double area_mm2;
+};
+
+/* How many, by the slices of the volume: 13, 21, 53, 117 or 245 of 16, 32, 64, 128 or 256. */
+enum { LUT_TSM_SAMPLE_LIMIT = 256, LUT_TSM_LOCAL_SIDE = 7, LUT_TSM_SIDE_MIN = 8, LUT_TSM_SIDE_MAX = 1024 };
+
+/*
+ * The response of a point to a unit of flux per mm^2 of the light's plane in the cell of a sample (T32), in
+ * 1/mm^2: what its power per mm^2 is, after multiplication by the sample's area. With D = x_out - x_in, N
+ * the normal where the light enters, dz how much deeper x_out lies along the light: S  cosine of N and D,
+ * node i of size[0] at -1 + 2i/(size[0] - 1) T  dz: node i of size[1] at depth_scale sinh((2i/(size[1] - 1)
+ * - 1) asinh(depth_max/depth_scale)) R  the sample Cells nearest to the point, five within a square of
+ * inner_mm, leave to the local response what lies about as deep as the point: see lut_tsm_proximity.
+ */
+struct lut_tsm {
+    struct io_material material;
+    double epsilon;
+    bool is_half;
+    int size[3], size_asked[3]; /* S, T, R; asked: 0 is chosen */
+    double depth_scale_mm, depth_max_mm, inner_mm;
+    int sample_count;
+    struct lut_tsm_sample samples[LUT_TSM_SAMPLE_LIMIT];
+    double scale[IO_CHANNEL_COUNT]; /* powers of two, which texels are to be multiplied with    */
+    struct lut_error error;         /* measured, relative to the whole response; with the next  */
+    double source_error;            /* of the model's sources over a flat surface (T30)         */
+    float *rgb;                     /* size[1] rows of size[2] slices side by side of size[0] texels */
+};
+
+/*
+ * Bake with thread_count threads (0: as many as processors); the bytes do not depend on it. A size of 0 is
+ * 64 x 64 x 32, and S and T are doubled up to 1024 until the error is at most epsilon; a size that is given
+ * must keep it. Fails like lut_splat_bake, or with DIPOLE_NOT_CONVERGED where the sources do.
+ */
+DIPOLE_CHECKED bool lut_tsm_bake(const struct lut_request *request, int thread_count,
+                                 struct lut_tsm **lut_out, dipole_status *status);
+void lut_tsm_destroy(struct lut_tsm *lut);
+
+/* Part of the light from five inner cells that the local response takes over, 1 at dz = 0 to 0 from
+ * inner_mm on. */
+double lut_tsm_proximity(const struct lut_tsm *lut, double dz_mm);
+
+/* The volume as a shader samples it, in 1/mm^2. cosine -1 to 1; 0 beyond depth_max. */
+void lut_tsm_sample(const struct lut_tsm *lut, int sample, double cosine, double dz_mm,
+                    double rgb_out[IO_CHANNEL_COUNT]);
+
+/* The local response: 7 x 7 cells of inner_mm/7, index i from -3 to 3, times a factor of their depth. Power
+ * per mm^2 is flux per mm^2 times the cell's area times both. */
+void lut_tsm_local_kernel(const struct lut_tsm *lut, int i, int j, double rgb_out[IO_CHANNEL_COUNT]);
+void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double rgb_out[IO_CHANNEL_COUNT]);
+
+/* Error against direct evaluation at count random points off the grid. */
+DIPOLE_CHECKED bool lut_tsm_audit(const struct lut_tsm *lut, size_t count, unsigned seed,
+                                  struct lut_error *error_out, dipole_status *status);
+
+DIPOLE_CHECKED bool lut_tsm_to_image(const struct lut_tsm *lut, struct io_image **image_out,
+                                     dipole_status *status);
+DIPOLE_CHECKED bool lut_tsm_from_image(const struct io_image *image, const char *path,
+                                       struct lut_tsm **lut_out, dipole_status *status);
 
 #endif

@@ -2,6 +2,7 @@
 #include "lutgen/internal.h"
 
 #include <assert.h>
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -115,6 +116,39 @@ void lut_profile_evaluate(const struct lut_profile *profile, const double *r_mm,
             const double x = r_mm[i] / profile->core_mm, t = x * x;
             values[i] = profile->core[0] + t * (profile->core[1] + t * profile->core[2]);
         }
+}
+
+/* A table in float keeps its digits only inside float's normal range. */
+bool lut_profiles_check_range(const struct lut_profile profiles[IO_CHANNEL_COUNT], dipole_status *status)
+{
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const double r_mm = 0;
+        double most;
+        lut_profile_evaluate(&profiles[c], &r_mm, 1, &most);
+        if (profiles[c].stack && (most > (double)FLT_MAX || profiles[c].floor_per_mm2 < (double)FLT_MIN))
+            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                               "channel %s falls from %.3g to %.3g per mm^2 within r_max, expected %.2g to "
+                               "%.2g (float)",
+                               io_channel_names[c], most, profiles[c].floor_per_mm2, (double)FLT_MAX,
+                               (double)FLT_MIN);
+    }
+    return true;
+}
+
+bool lut_request_check(const struct lut_request *request, dipole_status *status)
+{
+    if (!(request->epsilon >= LUT_EPSILON_MIN && request->epsilon <= LUT_EPSILON_MAX))
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "epsilon is %g, expected %g to %g",
+                           request->epsilon, LUT_EPSILON_MIN, LUT_EPSILON_MAX);
+    if (request->is_half && request->epsilon <= LUT_HALF_ROUNDING)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "epsilon is %g, expected > %.2g for a half table (half rounds by as much); use "
+                           "float",
+                           request->epsilon, LUT_HALF_ROUNDING);
+    const size_t limit = request->kind == LUT_SPLAT2D ? LUT_ROW_LIMIT : 1;
+    return (request->material_count >= 1 && request->material_count <= limit) ||
+           dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%zu materials, expected 1 to %zu",
+                       request->material_count, limit);
 }
 
 /* ---- numbers ------------------------------------------------------------------------------------ */

@@ -2,7 +2,6 @@
 #include "lutgen/internal.h"
 
 #include <assert.h>
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -212,30 +211,13 @@ static bool count_find(struct draft *draft, float *rgb, int *count_out, dipole_s
     return true;
 }
 
-/* A table in float keeps its digits only inside float's normal range. */
-static bool check_range(const struct lut_profile profiles[IO_CHANNEL_COUNT], dipole_status *status)
-{
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        const double r_mm = 0;
-        double most;
-        lut_profile_evaluate(&profiles[c], &r_mm, 1, &most);
-        if (profiles[c].stack && (most > (double)FLT_MAX || profiles[c].floor_per_mm2 < (double)FLT_MIN))
-            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
-                               "channel %s falls from %.3g to %.3g per mm^2 within r_max, expected %.2g to "
-                               "%.2g (float)",
-                               io_channel_names[c], most, profiles[c].floor_per_mm2, (double)FLT_MAX,
-                               (double)FLT_MIN);
-    }
-    return true;
-}
-
 /* Axis of one row, and the fewest nodes unless their number is given. rgb: room for LUT_NODE_COUNT_MAX. */
 static bool draft_plan(struct draft *draft, float *rgb, int *node_count, dipole_status *status)
 {
     /* half: 2^-14 to 65504 with a factor of e to spare; float holds more than any profile falls */
     const double log_range_limit = draft->is_half ? log(65504 / 0x1p-14) - 1 : 160;
     if (!lut_profiles_init(&draft->row->material, draft->epsilon, draft->profiles, status) ||
-        !check_range(draft->profiles, status))
+        !lut_profiles_check_range(draft->profiles, status))
         return false;
     draft->bend = lut_axis_find(draft->profiles, log_range_limit, &draft->row->axis, &draft->row->falloff);
     return *node_count > 0 || count_find(draft, rgb, node_count, status);
@@ -319,55 +301,54 @@ static bool table_bake(struct lut_splat *lut, struct draft *drafts, int node_cou
     return false;
 }
 
-static bool check_request(size_t count, double epsilon, int node_count, bool is_half, dipole_status *status)
+static bool check_request(const struct lut_request *request, dipole_status *status)
 {
-    if (!(epsilon >= LUT_EPSILON_MIN && epsilon <= LUT_EPSILON_MAX))
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "epsilon is %g, expected %g to %g", epsilon,
-                           LUT_EPSILON_MIN, LUT_EPSILON_MAX);
-    if (is_half && epsilon <= LUT_HALF_ROUNDING)
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
-                           "epsilon is %g, expected > %.2g for a half table (half rounds by as much); use "
-                           "float",
-                           epsilon, LUT_HALF_ROUNDING);
-    if (count < 1 || count > LUT_ROW_LIMIT)
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%zu materials, expected 1 to %d", count,
-                           LUT_ROW_LIMIT);
-    if (node_count != 0 && (node_count < LUT_NODE_COUNT_MIN || node_count > LUT_NODE_COUNT_MAX))
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%d texels, expected %d to %d", node_count,
-                           LUT_NODE_COUNT_MIN, LUT_NODE_COUNT_MAX);
-    return true;
+    const int node_count = request->size[0];
+    return lut_request_check(request, status) &&
+           (node_count == 0 || (node_count >= LUT_NODE_COUNT_MIN && node_count <= LUT_NODE_COUNT_MAX) ||
+            dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "a width of %d texels, expected %d to %d",
+                        node_count, LUT_NODE_COUNT_MIN, LUT_NODE_COUNT_MAX));
 }
 
-bool lut_splat_bake(const struct io_material *materials, size_t count, double epsilon, int node_count,
-                    bool is_half, struct lut_splat **lut_out, dipole_status *status)
+/* Rows of the request's materials, not yet baked; NULL: out of memory. */
+static struct lut_splat *table_create(const struct lut_request *request)
+{
+    struct lut_splat *const lut = calloc(1, sizeof *lut);
+    if (!lut || !(lut->rows = calloc(request->material_count, sizeof *lut->rows))) {
+        lut_splat_destroy(lut);
+        return NULL;
+    }
+    lut->epsilon = request->epsilon;
+    lut->is_half = request->is_half;
+    lut->node_count_asked = request->size[0];
+    lut->row_count = request->material_count;
+    for (size_t i = 0; i < lut->row_count; i++)
+        lut->rows[i].material = request->materials[i];
+    return lut;
+}
+
+bool lut_splat_bake(const struct lut_request *request, struct lut_splat **lut_out, dipole_status *status)
 {
     *lut_out = NULL;
-    if (!check_request(count, epsilon, node_count, is_half, status))
+    if (!check_request(request, status))
         return false;
-    struct lut_splat *const lut = calloc(1, sizeof *lut);
-    struct lut_splat_row *const rows = calloc(count, sizeof *rows);
+    const size_t count = request->material_count;
+    struct lut_splat *lut = table_create(request);
     struct draft *const drafts = calloc(count, sizeof *drafts);
-    bool is_done = false;
-    if (lut && rows && drafts) {
-        *lut =
-            (struct lut_splat){ .epsilon = epsilon, .is_half = is_half, .row_count = count, .rows = rows };
-        for (size_t i = 0; i < count; i++) {
-            rows[i].material = materials[i];
-            drafts[i] = (struct draft){ .row = &rows[i], .is_half = is_half, .epsilon = epsilon };
-        }
-        is_done = table_bake(lut, drafts, node_count, status);
-        for (size_t i = 0; i < count; i++)
-            lut_profiles_end(drafts[i].profiles);
-    } else {
-        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for %zu materials", count);
-        free(rows);
-    }
+    bool is_done = (lut && drafts) || dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                                                  "out of memory for %zu materials", count);
+    for (size_t i = 0; i < count && is_done; i++)
+        drafts[i] = (struct draft){ .row = &lut->rows[i],
+                                    .is_half = request->is_half,
+                                    .epsilon = request->epsilon };
+    is_done = is_done && table_bake(lut, drafts, request->size[0], status);
+    for (size_t i = 0; i < count && drafts; i++)
+        lut_profiles_end(drafts[i].profiles);
     free(drafts);
-    if (is_done)
-        *lut_out = lut;
-    else if (lut && lut->rows)
+    if (!is_done) {
         lut_splat_destroy(lut);
-    else
-        free(lut);
-    return is_done;
+        return false;
+    }
+    *lut_out = lut;
+    return true;
 }
