@@ -50,8 +50,10 @@ void io_image_destroy(struct io_image *image)
 {
     if (!image)
         return;
-    for (size_t i = 0; i < image->attribute_count; i++)
+    for (size_t i = 0; i < image->attribute_count; i++) {
+        assert(image->attributes);
         free(image->attributes[i].text);
+    }
     free(image->attributes);
     free(image);
 }
@@ -88,6 +90,7 @@ static bool set_attribute(struct io_image *image, const char *name, struct io_at
         free(attribute.text);
         return false;
     }
+    assert(image->attributes);
     memcpy(attribute.name, name, length + 1);
     if (i == image->attribute_count)
         image->attribute_count++;

@@ -1,0 +1,164 @@
+#include "io/raw.h"
+
+#include "io/dds.h"
+#include "io/file.h"
+#include "io/json.h"
+#include "io/texels.h"
+
+#include <inttypes.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool fail_without_memory(const char *path, dipole_status *status)
+{
+    const dipole_place place = { .source = path };
+    return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, &place, "no memory for its bytes or its description");
+}
+
+/* ---- the sidecar ---------------------------------------------------------------------------------- */
+
+static uint64_t fnv1a_64(const char *data, size_t size)
+{
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ (unsigned char)data[i]) * UINT64_C(0x100000001b3);
+    return hash;
+}
+
+/* Layout of the file at path, raw or DDS as its size says, and what is in it. */
+struct content {
+    struct io_texels texels;
+    size_t header_bytes, bytes;
+    uint64_t hash;
+};
+
+static bool read_content(const char *path, const struct io_image *image, int depth, bool is_half,
+                         struct content *content, dipole_status *status)
+{
+    struct io_texels raw, dds;
+    char *data;
+    if (!io_texels_init(&raw, path, image, depth, 3, is_half, status) ||
+        !io_texels_init(&dds, path, image, depth, 4, is_half, status) ||
+        !io_file_read(path, IO_DDS_HEADER_BYTES + dds.bytes, &data, &content->bytes, status))
+        return false;
+    content->hash = fnv1a_64(data, content->bytes);
+    free(data);
+    const bool is_raw = content->bytes == raw.bytes;
+    content->texels = is_raw ? raw : dds;
+    content->header_bytes = is_raw ? 0 : IO_DDS_HEADER_BYTES;
+    const dipole_place place = { .source = path };
+    return content->bytes == content->header_bytes + content->texels.bytes ||
+           dipole_fail(status, DIPOLE_BAD_VALUE, &place,
+                       "has %zu bytes, expected %zu (raw) or %zu (DDS) for this table", content->bytes,
+                       raw.bytes, IO_DDS_HEADER_BYTES + dds.bytes);
+}
+
+static bool is_json(const char *name)
+{
+    static const char end[] = "_json";
+    const size_t length = strlen(name);
+    return length >= sizeof end - 1 && strcmp(name + length - (sizeof end - 1), end) == 0;
+}
+
+/* NULL, with *reason, for what JSON has not. */
+static json_t *attribute_value(const struct io_attribute *attribute, const char **reason)
+{
+    const double *const numbers = attribute->numbers;
+    switch (attribute->kind) {
+    case IO_ATTRIBUTE_TEXT:
+        *reason = is_json(attribute->name) ? "is not JSON" : "is not UTF-8";
+        return is_json(attribute->name)
+                   ? json_loads(attribute->text, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, NULL)
+                   : json_string(attribute->text);
+    case IO_ATTRIBUTE_NUMBER:
+        *reason = "is not finite";
+        return json_real(numbers[0]);
+    case IO_ATTRIBUTE_NUMBERS:
+        *reason = "is not finite";
+        return json_pack("[f, f, f]", numbers[0], numbers[1], numbers[2]);
+    }
+    return NULL;
+}
+
+static json_t *describe_attributes(const char *path, const struct io_image *image, dipole_status *status)
+{
+    const dipole_place place = { .source = path };
+    json_t *const object = json_object();
+    for (size_t i = 0; i < image->attribute_count && object; i++) {
+        const struct io_attribute *const attribute = &image->attributes[i];
+        const char *reason = "";
+        if (json_object_set_new(object, attribute->name, attribute_value(attribute, &reason)) != 0) {
+            dipole_fail(status, DIPOLE_BAD_VALUE, &place, "attribute %s %s", attribute->name, reason);
+            json_decref(object);
+            return NULL;
+        }
+    }
+    if (!object)
+        fail_without_memory(path, status);
+    return object;
+}
+
+/* Takes over the attributes. */
+static char *describe(const struct content *content, json_t *attributes)
+{
+    const struct io_texels *const texels = &content->texels;
+    char format[8], hash[17], layout[256];
+    snprintf(format, sizeof format, "%s%zuf", texels->channel_count == 3 ? "rgb" : "rgba",
+             8 * texels->value_size);
+    snprintf(hash, sizeof hash, "%016" PRIx64, content->hash);
+    snprintf(
+        layout, sizeof layout,
+        "channel c of texel (x, y, z) is the %zu bytes at header_bytes + z*slice_bytes + y*row_bytes + "
+        "(%zu*x + c)*%zu; y counts from the top, z is the slice",
+        texels->value_size, texels->channel_count, texels->value_size);
+    json_t *const object = json_pack(
+        "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:s, s:s, s:o}", "format", format, "byte_order",
+        "little", "width", (json_int_t)texels->width, "height", (json_int_t)texels->height, "depth",
+        (json_int_t)texels->depth, "header_bytes", (json_int_t)content->header_bytes, "row_bytes",
+        (json_int_t)texels->row_bytes, "slice_bytes", (json_int_t)texels->slice_bytes, "bytes",
+        (json_int_t)content->bytes, "layout", layout, "content_hash", hash, "attributes", attributes);
+    char *const text = object ? io_json_format(object) : NULL;
+    json_decref(object);
+    return text;
+}
+
+bool io_sidecar_write(const char *path, const struct io_image *image, int depth, bool is_half,
+                      dipole_status *status)
+{
+    struct content content;
+    char sidecar_path[PATH_MAX];
+    const dipole_place place = { .source = path };
+    if (snprintf(sidecar_path, sizeof sidecar_path, "%s.json", path) >= (int)sizeof sidecar_path)
+        return dipole_fail(status, DIPOLE_IO_FAILED, &place, "has too long a name");
+    if (!read_content(path, image, depth, is_half, &content, status))
+        return false;
+    json_t *const attributes = describe_attributes(path, image, status);
+    if (!attributes)
+        return false;
+    char *const text = describe(&content, attributes);
+    if (!text)
+        return fail_without_memory(sidecar_path, status);
+    const bool done = io_file_write(sidecar_path, text, strlen(text), status);
+    free(text);
+    return done;
+}
+
+/* ---- the table ------------------------------------------------------------------------------------ */
+
+bool io_raw_write(const char *path, const struct io_image *image, int depth, bool is_half,
+                  dipole_status *status)
+{
+    struct io_texels texels;
+    if (!io_texels_init(&texels, path, image, depth, 3, is_half, status))
+        return false;
+    uint8_t *const data = malloc(texels.bytes);
+    if (!data)
+        return fail_without_memory(path, status);
+    io_texels_pack(&texels, image, data);
+    const bool done = io_file_write(path, data, texels.bytes, status);
+    free(data);
+    return done && io_sidecar_write(path, image, depth, is_half, status);
+}
