@@ -28,8 +28,9 @@ struct lut_profile {
     dipole_stack *stack; /* NULL: does not scatter, 0 everywhere                                        */
     double r_max_mm;
     double floor_per_mm2; /* R_d(r_max): errors are relative to no less                                 */
-    double shortest_mm;   /* the length below which the profile is flat                                 */
-    double core_mm, core[3]; /* R_d = core[0] + core[1] t + core[2] t^2 for t = (r/core)^2 < 1; T31     */
+    double mean_free_path_mm; /* the shortest of the layers */
+    double shortest_mm;       /* the length below which the profile is flat: the same, or the core's */
+    double core_mm, core[3];  /* R_d = core[0] + core[1] t + core[2] t^2 for t = (r/core)^2 < 1; T31     */
 };
 
 /* The channels of a material with r_max(epsilon); end them with lut_profiles_end, also after a failure. */

@@ -148,7 +148,7 @@ struct lut_tsm {
     double epsilon;
     bool is_half;
     int size[3], size_asked[3]; /* S, T, R; asked: 0 is chosen */
-    double depth_scale_mm, depth_max_mm, inner_mm;
+    double depth_scale_mm, depth_max_mm, inner_mm, local_depth_scale_mm;
     int sample_count;
     struct lut_tsm_sample samples[LUT_TSM_SAMPLE_LIMIT];
     double scale[IO_CHANNEL_COUNT]; /* powers of two, which texels are to be multiplied with    */
@@ -174,8 +174,11 @@ double lut_tsm_proximity(const struct lut_tsm *lut, double dz_mm);
 void lut_tsm_sample(const struct lut_tsm *lut, int sample, double cosine, double dz_mm,
                     double rgb_out[IO_CHANNEL_COUNT]);
 
-/* The local response: 7 x 7 cells of inner_mm/7, index i from -3 to 3, times a factor of their depth. Power
- * per mm^2 is flux per mm^2 times the cell's area times both. */
+/*
+ * The local response: 7 x 7 cells of inner_mm/7, indices from -3 to 3, in 1/mm^2, times a factor of their
+ * depth, which has size[0] nodes at |dz| = local_depth_scale sinh(i/(size[0] - 1)
+ * asinh(inner/local_depth_scale)). Power per mm^2 is flux per mm^2 times the cell's area times both.
+ */
 void lut_tsm_local_kernel(const struct lut_tsm *lut, int i, int j, double rgb_out[IO_CHANNEL_COUNT]);
 void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double rgb_out[IO_CHANNEL_COUNT]);
 

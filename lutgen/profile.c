@@ -69,6 +69,7 @@ static bool profile_init(const struct io_material *material, int channel, double
     for (size_t i = 0; i < material->layer_count; i++)
         profile->shortest_mm =
             fmin(profile->shortest_mm, dipole_stack_coefficients(profile->stack, i)->mean_free_path_mm);
+    profile->mean_free_path_mm = profile->shortest_mm;
     if (dipole_stack_total(profile->stack, DIPOLE_FACE_LIT) > 0) {
         profile->r_max_mm = dipole_stack_r_max_mm(profile->stack, DIPOLE_FACE_LIT, epsilon);
         profile->floor_per_mm2 = value_at(profile->stack, profile->r_max_mm);

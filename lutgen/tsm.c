@@ -24,6 +24,18 @@ double lut_tsm_depth_index(const struct lut_tsm *lut, double dz_mm)
     return 0.5 * (lut->size[1] - 1) * (1 + asinh(dz_mm / lut->depth_scale_mm) / end);
 }
 
+double lut_tsm_local_depth_mm(const struct lut_tsm *lut, double index)
+{
+    const double scale_mm = lut->local_depth_scale_mm;
+    return scale_mm * sinh(index / (lut->size[0] - 1) * asinh(lut->inner_mm / scale_mm));
+}
+
+double lut_tsm_local_depth_index(const struct lut_tsm *lut, double dz_mm)
+{
+    const double scale_mm = lut->local_depth_scale_mm;
+    return (lut->size[0] - 1) * (asinh(fabs(dz_mm) / scale_mm) / asinh(lut->inner_mm / scale_mm));
+}
+
 /* 1 at a depth of 0, 0 from inner_mm on, with two continuous derivatives. */
 double lut_tsm_proximity(const struct lut_tsm *lut, double dz_mm)
 {
@@ -103,7 +115,7 @@ struct plan {
     int class_count, radius_count;
     double *r_mm, *weight; /* of all classes' rules; the last radius is infinite */
     dipole_sources sources[IO_CHANNEL_COUNT];
-    double floor_per_mm2[IO_CHANNEL_COUNT];
+    double floor_per_mm2[IO_CHANNEL_COUNT], flat_inner_power[IO_CHANNEL_COUNT]; /* the latter at dz = 0 */
     struct lut_profile profiles[IO_CHANNEL_COUNT];
 };
 
@@ -206,8 +218,7 @@ static bool row_work_create(const struct plan *plan, size_t cosine_count, struct
 /* Rows of the volume are independent of each other. */
 struct row_loop {
     const struct plan *plan;
-    struct row_work *works;               /* per row */
-    double inner_power[IO_CHANNEL_COUNT]; /* at dz = 0 */
+    struct row_work *works; /* per row */
 };
 
 static void row_bake(void *context, int t)
@@ -222,7 +233,7 @@ static void row_bake(void *context, int t)
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (!plan->profiles[c].stack)
             continue;
-        const double inner = means_find(plan, c, dz_mm, work->within, work->means);
+        means_find(plan, c, dz_mm, work->within, work->means);
         for (int r = 0; r < lut->sample_count; r++) {
             response(plan, c, r, dz_mm, work->means[plan->class_of[r]], work->cosines, (size_t)lut->size[0],
                      work->values);
@@ -231,17 +242,14 @@ static void row_bake(void *context, int t)
             for (int s = 0; s < lut->size[0]; s++)
                 out[(size_t)s * IO_CHANNEL_COUNT] = (float)(part * work->values[s]);
         }
-        texel(lut, 0, t, lut_tsm_depth_slice(lut))[c] =
-            (float)(lut_tsm_proximity(lut, dz_mm) * inner / loop->inner_power[c]);
     }
 }
 
-/* Means over 7 x 7 cells of the inner square at dz = 0, and the power of all of them. */
-static double kernel_bake(const struct plan *plan, int channel)
+/* Means over 7 x 7 cells of the inner square at dz = 0. */
+static void kernel_bake(const struct plan *plan, int channel)
 {
     const struct lut_tsm *const lut = plan->lut;
     const double side = 1.0 / LUT_TSM_LOCAL_SIDE, cell_mm = side * lut->inner_mm;
-    double total = 0;
     for (int j = 0; j < LUT_TSM_LOCAL_SIDE; j++)
         for (int i = 0; i < LUT_TSM_LOCAL_SIDE; i++) {
             const double u = i * side - 0.5, v = j * side - 0.5;
@@ -254,12 +262,33 @@ static double kernel_bake(const struct plan *plan, int channel)
             for (int k = 0; k < count; k++)
                 power += weight[k] * within[k];
             texel(lut, i, j, lut_tsm_kernel_slice(lut))[channel] = (float)(power / (cell_mm * cell_mm));
-            total += power;
         }
-    return total;
 }
 
-static bool volume_bake(const struct plan *plan, int thread_count, dipole_status *status)
+/* The inner cells' power at a depth over that at dz = 0. */
+static double inner_part(const struct plan *plan, int channel, double dz_mm, const struct row_work *work)
+{
+    return means_find(plan, channel, dz_mm, work->within, work->means) / plan->flat_inner_power[channel];
+}
+
+/* Kernel and depth factors: in row 0 where the light enters above the point, in row 1 below. */
+static void local_bake(struct plan *plan, const struct row_work *work)
+{
+    struct lut_tsm *const lut = plan->lut;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!plan->profiles[c].stack)
+            continue;
+        kernel_bake(plan, c);
+        for (int row = 0; row < 2; row++)
+            for (int s = 0; s < lut->size[0]; s++) {
+                const double dz_mm = (row == 0 ? 1 : -1) * lut_tsm_local_depth_mm(lut, s);
+                texel(lut, s, row, lut_tsm_depth_slice(lut))[c] =
+                    (float)(lut_tsm_proximity(lut, dz_mm) * inner_part(plan, c, dz_mm, work));
+            }
+    }
+}
+
+static bool volume_bake(struct plan *plan, int thread_count, dipole_status *status)
 {
     struct lut_tsm *const lut = plan->lut;
     const int rows = lut->size[1];
@@ -269,9 +298,7 @@ static bool volume_bake(const struct plan *plan, int thread_count, dipole_status
     for (int t = 0; t < rows && is_done; t++)
         is_done = row_work_create(plan, (size_t)lut->size[0], &works[t]);
     if (is_done) {
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            if (plan->profiles[c].stack)
-                loop.inner_power[c] = kernel_bake(plan, c);
+        local_bake(plan, &works[0]);
         lut_parallel_for(rows, thread_count, row_bake, &loop);
     }
     for (int t = 0; t < rows && works; t++)
@@ -280,21 +307,26 @@ static bool volume_bake(const struct plan *plan, int thread_count, dipole_status
     return is_done || dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume");
 }
 
-/* Divide by powers of two so that half holds the values, and round them to half. */
+/* Divide by powers of two so that half holds the values, and round them to half; depth factors are 0 to 1.
+ */
 static void volume_round(struct lut_tsm *lut)
 {
-    const size_t width = (size_t)lut->size[0] * (size_t)lut->size[2], count = width * (size_t)lut->size[1];
-    const size_t factors = (size_t)lut_tsm_depth_slice(lut) * (size_t)lut->size[0];
-    for (size_t c = 0; c < IO_CHANNEL_COUNT; c++) {
-        double most = 0;
-        for (size_t i = 0; i < count; i++)
-            if (i % width != factors)
-                most = fmax(most, (double)lut->rgb[i * IO_CHANNEL_COUNT + c]);
-        lut->scale[c] = lut_half_scale(most);
-        for (size_t i = 0; i < count; i++) {
-            float *const value = &lut->rgb[i * IO_CHANNEL_COUNT + c];
-            *value = (float)lut_half_round((double)*value / (i % width == factors ? 1 : lut->scale[c]));
-        }
+    const int factors = lut_tsm_depth_slice(lut);
+    double most[IO_CHANNEL_COUNT] = { 0 };
+    for (int pass = 0; pass < 2; pass++) {
+        for (int t = 0; t < lut->size[1]; t++)
+            for (int r = 0; r <= factors; r++)
+                for (int s = 0; s < lut->size[0]; s++)
+                    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+                        float *const value = &texel(lut, s, t, r)[c];
+                        if (pass == 0 && r < factors)
+                            most[c] = fmax(most[c], (double)*value);
+                        else if (pass == 1)
+                            *value =
+                                (float)lut_half_round((double)*value / (r < factors ? lut->scale[c] : 1));
+                    }
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            lut->scale[c] = lut_half_scale(most[c]);
     }
 }
 
@@ -334,12 +366,13 @@ void lut_tsm_local_kernel(const struct lut_tsm *lut, int i, int j, double rgb_ou
 
 void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double rgb_out[IO_CHANNEL_COUNT])
 {
-    double ft;
-    const int t = split(lut_tsm_depth_index(lut, dz_mm), lut->size[1], &ft), r = lut_tsm_depth_slice(lut);
+    double f;
+    const int s = split(lut_tsm_local_depth_index(lut, dz_mm), lut->size[0], &f);
+    const int row = dz_mm >= 0 ? 0 : 1, r = lut_tsm_depth_slice(lut);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        rgb_out[c] = fabs(dz_mm) <= lut->depth_max_mm ? (1 - ft) * (double)texel(lut, 0, t, r)[c] +
-                                                            ft * (double)texel(lut, 0, t + 1, r)[c]
-                                                      : 0;
+        rgb_out[c] = fabs(dz_mm) < lut->inner_mm ? (1 - f) * (double)texel(lut, s, row, r)[c] +
+                                                       f * (double)texel(lut, s + 1, row, r)[c]
+                                                 : 0;
 }
 
 /* ---- audit -------------------------------------------------------------------------------------- */
@@ -384,18 +417,41 @@ static size_t depth_audit(const struct plan *plan, enum audit which, uint64_t *r
     return count;
 }
 
+/* The same of the local response's depth factor, relative to the whole response, too. */
+static size_t local_audit(const struct plan *plan, uint64_t *random, const struct row_work *work,
+                          double *errors)
+{
+    const struct lut_tsm *const lut = plan->lut;
+    const double side = lut_random(random) < 0.5 ? -1 : 1;
+    const double dz_mm = side * lut_tsm_local_depth_mm(lut, lut_random(random) * (lut->size[0] - 1));
+    size_t count = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!plan->profiles[c].stack)
+            continue;
+        double sampled[IO_CHANNEL_COUNT];
+        const double whole = inner_part(plan, c, dz_mm, work);
+        lut_tsm_local_depth_factor(lut, dz_mm, sampled);
+        errors[count++] = fabs(sampled[c] - lut_tsm_proximity(lut, dz_mm) * whole) / whole;
+    }
+    return count;
+}
+
 static bool audit(const struct plan *plan, enum audit which, size_t count, unsigned seed,
                   struct lut_error *error_out, dipole_status *status)
 {
-    const size_t per_depth = (size_t)plan->lut->sample_count * COSINES_AUDITED * IO_CHANNEL_COUNT;
+    const size_t per_depth =
+        (size_t)plan->lut->sample_count * COSINES_AUDITED * IO_CHANNEL_COUNT + IO_CHANNEL_COUNT;
     const size_t depths = count / per_depth + 1;
     double *const errors = malloc(depths * per_depth * sizeof *errors);
     struct row_work work = { 0 };
     const bool is_done = errors && row_work_create(plan, COSINES_AUDITED, &work);
     uint64_t random = seed;
     size_t filled = 0;
-    for (size_t i = 0; i < depths && is_done; i++)
+    for (size_t i = 0; i < depths && is_done; i++) {
         filled += depth_audit(plan, which, &random, &work, errors + filled);
+        if (which == AUDIT_BOTH)
+            filled += local_audit(plan, &random, &work, errors + filled);
+    }
     *error_out = filled > 0 ? lut_error_of(errors, filled) : (struct lut_error){ 0 };
     free(work.within);
     free(errors);
@@ -421,6 +477,10 @@ static void plan_destroy(struct plan *plan)
     free(plan);
 }
 
+/* The pattern reaches so far that this part of the light comes from farther, which the last ring takes: a
+ * wider one would have coarser cells. */
+static const double extent_epsilon = 0.03;
+
 /* Lengths and samples follow from the material, epsilon and the number of slices. */
 static void samples_find(struct plan *plan)
 {
@@ -433,7 +493,10 @@ static void samples_find(struct plan *plan)
         r_max_mm = plan->profiles[0].r_max_mm;
     lut->inner_mm = 2 * r_max_mm / lut_pattern_extent(lut->size[2]);
     lut->depth_max_mm = r_max_mm;
-    lut->depth_scale_mm = 0.25 * lut->inner_mm;
+    lut->depth_scale_mm = lut->inner_mm;
+    lut->local_depth_scale_mm = lut->inner_mm;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        lut->local_depth_scale_mm = fmin(lut->local_depth_scale_mm, plan->profiles[c].mean_free_path_mm);
     lut->sample_count = lut_pattern_cells(lut->size[2], plan->cells);
     for (int i = 0; i < lut->sample_count; i++) {
         const struct lut_cell *const cell = &plan->cells[i];
@@ -476,13 +539,21 @@ static bool plan_create(struct lut_tsm *lut, struct plan **plan_out, dipole_stat
     plan->lut = lut;
     plan->r_mm = rules;
     plan->weight = rules + LUT_TSM_SAMPLE_LIMIT * RULE_LIMIT + 1;
-    if (!lut_profiles_init(&lut->material, lut->epsilon, plan->profiles, status) ||
+    if (!lut_profiles_init(&lut->material, extent_epsilon, plan->profiles, status) ||
         !lut_profiles_check_range(plan->profiles, status))
         return false;
     samples_find(plan);
     if (!sources_find(plan, status))
         return false;
     classes_find(plan);
+    double means[LUT_TSM_SAMPLE_LIMIT];
+    double *const within = malloc(((size_t)plan->radius_count + 1) * sizeof *within);
+    if (!within)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume");
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        if (plan->profiles[c].stack)
+            plan->flat_inner_power[c] = means_find(plan, c, 0, within, means);
+    free(within);
     return true;
 }
 

@@ -23,6 +23,8 @@ int lut_tsm_kernel_slice(const struct lut_tsm *lut);
 int lut_tsm_depth_slice(const struct lut_tsm *lut);
 
 double lut_tsm_depth_mm(const struct lut_tsm *lut, double index); /* of a T node, or between */
+double lut_tsm_local_depth_mm(const struct lut_tsm *lut, double index);
+double lut_tsm_local_depth_index(const struct lut_tsm *lut, double dz_mm);
 double lut_tsm_depth_index(const struct lut_tsm *lut, double dz_mm);
 
 #endif
