@@ -7,7 +7,7 @@
 
 /* Places a decade, of radii and of depths; how far depths reach beyond the radii at either end; and beyond
  * how many decay lengths nothing lies. */
-static const double rows_per_decade = 12.0, least_steps = 40.0, columns_per_decade = 16.0;
+static const double rows_per_decade = 12.0, least_steps = 40.0, columns_per_decade = 8.0;
 static const double depth_first = 0.1, depth_last = 3.0, depth_end = 30.0;
 
 /* Between the decays of sources, and the fastest of all, in 1/mean free path. */
@@ -29,10 +29,10 @@ static bool samples_fill(const dipole_stack *stack, double r_min_mm, double r_ma
                          struct samples *out)
 {
     const double range = log(r_max_mm / r_min_mm);
-    const double steps = fmax(least_steps, ceil(rows_per_decade / log(10.0) * range));
-    out->count = 0;
-    for (double i = in_middle ? 0.5 : 0.0; i <= steps; i += 1.0)
-        out->r_mm[out->count++] = r_min_mm * exp(range * (i / steps));
+    const size_t steps = (size_t)fmax(least_steps, ceil(rows_per_decade / log(10.0) * range));
+    out->count = in_middle ? steps : steps + 1;
+    for (size_t i = 0; i < out->count; i++)
+        out->r_mm[i] = r_min_mm * exp(range * (((double)i + (in_middle ? 0.5 : 0.0)) / (double)steps));
     dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, out->r_mm, out->count, out->values);
     for (size_t i = 0; i < out->count; i++)
         if (!(out->values[i] > 0.0)) {
@@ -286,7 +286,7 @@ static void sources_fill(const struct fit *fit, double r_max_mm, double power, d
 bool dipole_source_fit(const dipole_stack *stack, double epsilon, double r_min_mm, double r_max_mm,
                        dipole_sources *out, double *bad_r_mm)
 {
-    struct samples samples, between;
+    struct samples samples = { .count = 0 }, between = { .count = 0 };
     for (int k = 0; k < 2; k++) {
         struct samples *const each = k ? &between : &samples;
         *bad_r_mm = r_max_mm;

@@ -35,7 +35,7 @@ static struct source_pair source_pair_of(const dipole_sources *sources, size_t k
 /* x up to 500, lengths of 1e-12 to 1e15 mm and no weight below 1e-20: no term is below 1e-290. */
 static bool is_usual(const dipole_sources *sources, double distance_mm)
 {
-    bool is_good = distance_mm >= 0.0 && distance_mm < 1e15;
+    bool is_good = sources->count > 0 && distance_mm >= 0.0 && distance_mm < 1e15;
     for (size_t k = 0; k < sources->count; k++) {
         const double z = fabs(sources->at[k].depth_mm), s = sources->at[k].sigma_tr_per_mm;
         is_good &= z > 1e-12 && z < 1e15 && s * (distance_mm + z) < 500.0 && sources->at[k].weight > 1e-20;
@@ -66,26 +66,41 @@ static double value_at(const dipole_sources *sources, double distance_mm, double
         const double d2 = square(distance_mm + z * cosine) + z * z * (1.0 - cosine) * (1.0 + cosine);
         sum += sources->at[k].weight * source_lobe(&sources->at[k], d2);
     }
-    return distance_mm >= 0.0 ? sum / (2.0 * PI) : NAN;
+    return distance_mm >= 0.0 && fabs(cosine) <= 1.0 ? sum / (2.0 * PI) : NAN;
 }
 
-static void profile(const dipole_sources *sources, double distance_mm, const double *restrict cosines,
-                    size_t count, double *restrict values)
+/* A cosine out of range makes the first two sources NaN, and so the sum. */
+static void profile_begin(const struct source_pair *pair_in, const double *restrict cosines, size_t count,
+                          double *restrict values)
 {
-    if (is_usual(sources, distance_mm)) {
-        for (size_t i = 0; i < count; i++)
-            values[i] = 0.0;
-        for (size_t k = 0; k < sources->count; k += 2) {
-            const struct source_pair pair = source_pair_of(sources, k, distance_mm);
-            for (size_t i = 0; i < count; i++)
-                values[i] += source_pair_value(&pair, cosines[i]);
-        }
-    } else {
+    const struct source_pair pair = *pair_in;
+    for (size_t i = 0; i < count; i++)
+        values[i] = source_pair_value(&pair, fabs(cosines[i]) <= 1.0 ? cosines[i] : NAN);
+}
+
+static void profile_add(const struct source_pair *pair_in, const double *restrict cosines, size_t count,
+                        double *restrict values)
+{
+    const struct source_pair pair = *pair_in;
+    for (size_t i = 0; i < count; i++)
+        values[i] += source_pair_value(&pair, cosines[i]);
+}
+
+static void profile(const dipole_sources *sources, double distance_mm, const double *cosines, size_t count,
+                    double *values)
+{
+    if (!is_usual(sources, distance_mm)) {
         for (size_t i = 0; i < count; i++)
             values[i] = value_at(sources, distance_mm, cosines[i]);
+        return;
     }
-    for (size_t i = 0; i < count; i++)
-        values[i] = cosines[i] >= -1.0 && cosines[i] <= 1.0 ? values[i] : NAN;
+    for (size_t k = 0; k < sources->count; k += 2) {
+        const struct source_pair pair = source_pair_of(sources, k, distance_mm);
+        if (k == 0)
+            profile_begin(&pair, cosines, count, values);
+        else
+            profile_add(&pair, cosines, count, values);
+    }
 }
 
 /* ---- discs ---------------------------------------------------------------------------------------- */
@@ -96,7 +111,7 @@ static void profile(const dipole_sources *sources, double distance_mm, const dou
  *   |z| (e^(-s d0)/d0 - e^(-s d)/d) = |z| e^(-s d0)/d [D/d0 + 1 - e^(-s D)],  D = d - d0.
  */
 struct source_disc {
-    double sigma_tr, rise2, floor, hold2, start, held, faded;
+    double sigma_tr, rise2, floor, hold2, start, over_start, held, faded;
 };
 
 static struct source_disc source_disc_of(const dipole_sources *sources, size_t k, double height_mm)
@@ -104,13 +119,15 @@ static struct source_disc source_disc_of(const dipole_sources *sources, size_t k
     const double z = sources->at[k].depth_mm, depth = fabs(z), s = sources->at[k].sigma_tr_per_mm;
     const double weighted_z = sources->at[k].weight * depth;
     const double hold2 = -height_mm * (height_mm + 2.0 * z); /* z^2 - rise^2 */
-    const double rise = fabs(height_mm + z), start = hold2 > 0.0 ? depth : rise;
+    const double above = fabs(height_mm + z), rise = above > LOBE_FAR_MM ? LOBE_FAR_MM : above,
+                 start = hold2 > 0.0 ? depth : rise;
     return (struct source_disc){
         .sigma_tr = s,
         .rise2 = rise * rise,
         .floor = depth * depth,
         .hold2 = hold2 > 0.0 ? hold2 : 0.0,
         .start = start,
+        .over_start = 1.0 / start,
         .held = 0.5 * weighted_z * (s + 1.0 / depth) * exp(-s * depth) / (depth * depth),
         .faded = weighted_z * exp(-s * start),
     };
@@ -121,9 +138,9 @@ static inline double source_disc_within(const struct source_disc *disc, double r
     const double r = r_mm > LOBE_FAR_MM ? LOBE_FAR_MM : r_mm, r2 = r * r;
     const double d2 = r2 + disc->rise2, d = sqrt(d2 < disc->floor ? disc->floor : d2);
     const double inner = r2 < disc->hold2 ? r2 : disc->hold2, outer = r2 - inner;
-    const double longer = outer / (d + disc->start);
-    return disc->held * inner +
-           disc->faded * ((longer / disc->start + decay_deficit(disc->sigma_tr * longer)) / d);
+    const double sum = d + disc->start, over = 1.0 / (d * sum), longer = outer * (d * over);
+    const double share = MULTIPLY_ADD(longer, disc->over_start, decay_deficit(disc->sigma_tr * longer));
+    return MULTIPLY_ADD(disc->held, inner, disc->faded * (share * (sum * over)));
 }
 
 static void within(const dipole_sources *sources, double height_mm, const double *restrict r_mm,

@@ -155,7 +155,7 @@ static void nothing_else_allocates(void **state)
             (void)dipole_stack_splat_spacing_mm(stack, face, 0.01);
         }
         dipole_sources sources;
-        (void)dipole_sources_init(stack, 0.01, 0.1, 2.0, &sources, NULL);
+        assert_true(dipole_sources_init(stack, 0.01, 0.1, 2.0, &sources, NULL));
         assert_true(dipole_sources_between_per_mm2(&sources, origin_mm, normal, origin_mm) > 0.0);
         assert_true(dipole_sources_within(&sources, -0.1, 1.0) > 0.0);
         assert_int_equal(call_count, 0);
