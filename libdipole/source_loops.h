@@ -9,11 +9,11 @@
 /* ---- one distance, many directions ---------------------------------------------------------------- */
 
 /*
- * Two sources at one distance D: d^2 = D^2 + z^2 + 2 z D cos, no less than z^2. As in row_loops.h the fast
- * loop leaves out the second double of sigma_tr and what only extreme inputs need.
+ * Two sources at one distance D: d^2 = D^2 + z^2 + 2 z D cos, continued below z^2 as in sources.h. As in
+ * row_loops.h the fast loop leaves out the second double of sigma_tr and what only extreme inputs need.
  */
 struct source_pair {
-    double sigma_tr[2], middle[2], slope[2], floor[2], weighted_z[2];
+    double sigma_tr[2], middle[2], slope[2], floor[2], over_floor[2], steepness[2], weighted_z[2];
 };
 
 static struct source_pair source_pair_of(const dipole_sources *sources, size_t k, double distance_mm)
@@ -27,6 +27,8 @@ static struct source_pair source_pair_of(const dipole_sources *sources, size_t k
         pair.middle[i] = MULTIPLY_ADD(distance_mm, distance_mm, z * z);
         pair.slope[i] = 2.0 * z * distance_mm;
         pair.floor[i] = z * z;
+        pair.over_floor[i] = 1.0 / (z * z);
+        pair.steepness[i] = source_steepness(source->sigma_tr_per_mm * fabs(z));
         pair.weighted_z[i] = (is_last ? 0.5 : 1.0) / (2.0 * PI) * source->weight * fabs(z);
     }
     return pair;
@@ -51,7 +53,9 @@ static inline double source_pair_value(const struct source_pair *pair, double co
     const double a2 = a < pair->floor[0] ? pair->floor[0] : a, b2 = b < pair->floor[1] ? pair->floor[1] : b;
     const double d_a = sqrt(a2), d_b = sqrt(b2), x_a = pair->sigma_tr[0] * d_a,
                  x_b = pair->sigma_tr[1] * d_b;
-    const double w_a = pair->weighted_z[0], w_b = pair->weighted_z[1];
+    const double u_a = (a2 - a) * pair->over_floor[0], u_b = (b2 - b) * pair->over_floor[1];
+    const double w_a = pair->weighted_z[0] * (1.0 + pair->steepness[0] * (u_a - 0.5 * u_a * u_a)),
+                 w_b = pair->weighted_z[1] * (1.0 + pair->steepness[1] * (u_b - 0.5 * u_b * u_b));
     const double e_a = decay_times_normal(MULTIPLY_ADD(w_a, x_a, w_a), x_a),
                  e_b = decay_times_normal(MULTIPLY_ADD(w_b, x_b, w_b), x_b);
     const double a3 = d_a * a2, b3 = d_b * b2;
@@ -106,12 +110,13 @@ static void profile(const dipole_sources *sources, double distance_mm, const dou
 /* ---- discs ---------------------------------------------------------------------------------------- */
 
 /*
- * One source over a disc whose plane it is `rise` = height + z away from: out to hold, where d = |z|, its
- * lobe is constant; beyond, |z| e^(-s d)/d is differenced by hand as in lobe.h:
- *   |z| (e^(-s d0)/d0 - e^(-s d)/d) = |z| e^(-s d0)/d [D/d0 + 1 - e^(-s D)],  D = d - d0.
+ * One source over a disc whose plane it is `rise` = height + z away from. Beyond where d = |z| its |z|
+ * e^(-s d)/d is differenced by hand as in lobe.h: |z| (e^(-s d0)/d0 - e^(-s d)/d) = |z| e^(-s d0)/d [D/d0 +
+ * 1 - e^(-s D)],  D = d - d0. Out to there, r^2 up to `hold2`, the parabola of sources.h is integrated over
+ * r^2, with u from u0 down to u1: lobe(z) [r^2 + b ((u0 + u1)/2 - (u0^2 + u0 u1 + u1^2)/6) r^2]/2.
  */
 struct source_disc {
-    double sigma_tr, rise2, floor, hold2, start, over_start, held, faded;
+    double sigma_tr, rise2, floor, over_floor, hold2, start, over_start, held, steepness, faded;
 };
 
 static struct source_disc source_disc_of(const dipole_sources *sources, size_t k, double height_mm)
@@ -125,6 +130,8 @@ static struct source_disc source_disc_of(const dipole_sources *sources, size_t k
         .sigma_tr = s,
         .rise2 = rise * rise,
         .floor = depth * depth,
+        .over_floor = 1.0 / (depth * depth),
+        .steepness = source_steepness(s * depth),
         .hold2 = hold2 > 0.0 ? hold2 : 0.0,
         .start = start,
         .over_start = 1.0 / start,
@@ -140,7 +147,10 @@ static inline double source_disc_within(const struct source_disc *disc, double r
     const double inner = r2 < disc->hold2 ? r2 : disc->hold2, outer = r2 - inner;
     const double sum = d + disc->start, over = 1.0 / (d * sum), longer = outer * (d * over);
     const double share = MULTIPLY_ADD(longer, disc->over_start, decay_deficit(disc->sigma_tr * longer));
-    return MULTIPLY_ADD(disc->held, inner, disc->faded * (share * (sum * over)));
+    const double u0 = disc->hold2 * disc->over_floor, u1 = u0 - inner * disc->over_floor;
+    const double mean = 0.5 * (u0 + u1) - (u0 * u0 + u0 * u1 + u1 * u1) / 6.0;
+    const double held = disc->held * MULTIPLY_ADD(disc->steepness, mean, 1.0);
+    return MULTIPLY_ADD(held, inner, disc->faded * (share * (sum * over)));
 }
 
 static void within(const dipole_sources *sources, double height_mm, const double *restrict r_mm,

@@ -9,15 +9,28 @@
 
 #include "libdipole/dipole.h"
 
-/* |depth| (sigma_tr + 1/d) e^(-sigma_tr d)/d^2 with d at least |depth|: as a lobe, at the distance that
- * makes the hypotenuse d. */
+/*
+ * Nearer to a source than its own depth, which happens off a flat surface only, its lobe would have no
+ * bound. There it is continued as a parabola in t = (d/z)^2 that has the same value and slope at t = 1 and
+ * is level at the source: lobe(z) (1 + b (u - u^2/2)), u = 1 - t, b = -d log lobe/dt = (3 + x^2/(1 + x))/2,
+ * x = sigma_tr z.
+ */
+static inline double source_steepness(double x)
+{
+    return 0.5 * (3.0 + x * (x / (1.0 + x)));
+}
+
+/* |depth| (sigma_tr + 1/d) e^(-sigma_tr d)/d^2, so continued: as a lobe, at the distance that makes the
+ * hypotenuse d. */
 static inline double source_lobe(const dipole_source *source, double d2_mm2)
 {
     const double z = fabs(source->depth_mm), r2 = d2_mm2 - z * z;
     const double r = sqrt(r2 < 0.0 ? 0.0 : r2); /* NaN stays NaN */
     const struct dd sigma_tr = { source->sigma_tr_per_mm, source->sigma_tr_low_per_mm };
     const double distance = lobe_distance(r);
-    return lobe_value((struct dd){ z, 0.0 }, sigma_tr, distance, lobe_square(distance));
+    const double u = r2 < 0.0 ? -r2 / (z * z) : 0.0;
+    return lobe_value((struct dd){ z, 0.0 }, sigma_tr, distance, lobe_square(distance)) *
+           (1.0 + source_steepness(source->sigma_tr_per_mm * z) * (u - 0.5 * u * u));
 }
 
 /* r_max_mm over r_min_mm. */

@@ -182,8 +182,9 @@ void lut_tsm_sample(const struct lut_tsm *lut, int sample, double cosine, double
 void lut_tsm_local_kernel(const struct lut_tsm *lut, int i, int j, double rgb_out[IO_CHANNEL_COUNT]);
 void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double rgb_out[IO_CHANNEL_COUNT]);
 
-/* Error against direct evaluation at count random points off the grid. */
-DIPOLE_CHECKED bool lut_tsm_audit(const struct lut_tsm *lut, size_t count, unsigned seed,
+/* Error against direct evaluation off the grid: at depth_count random depths all samples at random cosines.
+ * Without source_error. */
+DIPOLE_CHECKED bool lut_tsm_audit(const struct lut_tsm *lut, int depth_count, unsigned seed,
                                   struct lut_error *error_out, dipole_status *status);
 
 DIPOLE_CHECKED bool lut_tsm_to_image(const struct lut_tsm *lut, struct io_image **image_out,

@@ -377,23 +377,26 @@ void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double 
 
 /* ---- audit -------------------------------------------------------------------------------------- */
 
-enum { COSINES_AUDITED = 2 };
+/* Cosines at each depth, one in each of as many parts. */
+enum { COSINES_AUDITED = 8 };
 
 /* Which axes' points lie off the grid. */
 enum audit { AUDIT_BOTH = 0, AUDIT_S, AUDIT_T };
 
-static double between_nodes(uint64_t *random, int count, bool is_off_grid)
+/* A random index of an axis in part `part` of `parts`: in the middle between two nodes, where linear
+ * interpolation errs most, or anywhere, or at a node. */
+static double index_choose(uint64_t *random, int node_count, int part, int parts, bool is_off_grid)
 {
-    const double x = lut_random(random) * (count - 1);
-    return is_off_grid ? x : round(x);
+    const double x = (part + lut_random(random)) / parts * (node_count - 1);
+    const bool is_middle = lut_random(random) < 0.5;
+    return !is_off_grid ? round(x) : is_middle ? fmin(floor(x), node_count - 2) + 0.5 : x;
 }
 
-/* Errors at one random depth, for every sample and channel at some cosines; returns how many. */
-static size_t depth_audit(const struct plan *plan, enum audit which, uint64_t *random,
+/* Errors at one depth, for every sample and channel at some cosines; returns how many. */
+static size_t depth_audit(const struct plan *plan, double dz_mm, bool is_s_off_grid, uint64_t *random,
                           const struct row_work *work, double *errors)
 {
     const struct lut_tsm *const lut = plan->lut;
-    const double dz_mm = lut_tsm_depth_mm(lut, between_nodes(random, lut->size[1], which != AUDIT_S));
     size_t count = 0;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (!plan->profiles[c].stack)
@@ -402,7 +405,9 @@ static size_t depth_audit(const struct plan *plan, enum audit which, uint64_t *r
         for (int r = 0; r < lut->sample_count; r++) {
             for (int k = 0; k < COSINES_AUDITED; k++)
                 work->cosines[k] =
-                    2 * between_nodes(random, lut->size[0], which != AUDIT_T) / (lut->size[0] - 1) - 1;
+                    2 * index_choose(random, lut->size[0], k, COSINES_AUDITED, is_s_off_grid) /
+                        (lut->size[0] - 1) -
+                    1;
             response(plan, c, r, dz_mm, work->means[plan->class_of[r]], work->cosines, COSINES_AUDITED,
                      work->values);
             const double part = left_to_global(plan, r, dz_mm);
@@ -436,19 +441,20 @@ static size_t local_audit(const struct plan *plan, uint64_t *random, const struc
     return count;
 }
 
-static bool audit(const struct plan *plan, enum audit which, size_t count, unsigned seed,
+static bool audit(const struct plan *plan, enum audit which, int depth_count, unsigned seed,
                   struct lut_error *error_out, dipole_status *status)
 {
     const size_t per_depth =
         (size_t)plan->lut->sample_count * COSINES_AUDITED * IO_CHANNEL_COUNT + IO_CHANNEL_COUNT;
-    const size_t depths = count / per_depth + 1;
-    double *const errors = malloc(depths * per_depth * sizeof *errors);
+    double *const errors = malloc((size_t)depth_count * per_depth * sizeof *errors);
     struct row_work work = { 0 };
     const bool is_done = errors && row_work_create(plan, COSINES_AUDITED, &work);
     uint64_t random = seed;
     size_t filled = 0;
-    for (size_t i = 0; i < depths && is_done; i++) {
-        filled += depth_audit(plan, which, &random, &work, errors + filled);
+    for (int i = 0; i < depth_count && is_done; i++) {
+        const double t = index_choose(&random, plan->lut->size[1], i, depth_count, which != AUDIT_S);
+        filled += depth_audit(plan, lut_tsm_depth_mm(plan->lut, t), which != AUDIT_T, &random, &work,
+                              errors + filled);
         if (which == AUDIT_BOTH)
             filled += local_audit(plan, &random, &work, errors + filled);
     }
@@ -512,12 +518,14 @@ static bool sources_find(struct plan *plan, dipole_status *status)
     struct lut_tsm *const lut = plan->lut;
     /* a tenth of the error; the shallowest point that is asked for lies half a local cell away */
     const double epsilon = fmin(fmax(0.1 * lut->epsilon, 1e-6), 0.1);
-    const double r_min_mm = 0.5 * lut->inner_mm / LUT_TSM_LOCAL_SIDE, r_max_mm = 2 * lut->depth_max_mm;
+    const double r_min_mm = 0.5 * lut->inner_mm / LUT_TSM_LOCAL_SIDE;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         const struct lut_profile *const profile = &plan->profiles[c];
         dipole_status why = { 0 };
         if (!profile->stack)
             continue;
+        /* beyond r_max the error is relative to the profile there, which falls to nothing soon after */
+        const double r_max_mm = fmax(2 * profile->r_max_mm, 2 * r_min_mm);
         if (!dipole_sources_init(profile->stack, epsilon, r_min_mm, r_max_mm, &plan->sources[c], &why))
             return dipole_fail(status, why.code, NULL, "channel %s: %s", io_channel_names[c], why.message);
         lut->source_error = fmax(lut->source_error, plan->sources[c].max_relative_error);
@@ -557,8 +565,8 @@ static bool plan_create(struct lut_tsm *lut, struct plan **plan_out, dipole_stat
     return true;
 }
 
-/* Random points of the audits that choose the size, and of the one that is stated. */
-enum { POINTS_SEARCHED = 8192, POINTS_STATED = 32768 };
+/* What lies between the points of an audit can be so much larger. */
+static const double audit_margin = 1.1;
 
 static bool try_size(struct plan *plan, int thread_count, dipole_status *status)
 {
@@ -576,10 +584,10 @@ static bool try_size(struct plan *plan, int thread_count, dipole_status *status)
         return false;
     if (lut->is_half)
         volume_round(lut);
-    if (!audit(plan, AUDIT_BOTH, POINTS_STATED, LUT_SEED_BAKE, &lut->error, status))
+    if (!audit(plan, AUDIT_BOTH, 2 * lut->size[1], LUT_SEED_BAKE, &lut->error, status))
         return false;
-    lut->error.max = 1.02 * lut->error.max + lut->source_error; /* 2 % for what lies between the points */
-    lut->error.p99 = fmin(1.02 * lut->error.p99 + lut->source_error, lut->error.max);
+    lut->error.max = audit_margin * lut->error.max + lut->source_error;
+    lut->error.p99 = fmin(audit_margin * lut->error.p99 + lut->source_error, lut->error.max);
     return true;
 }
 
@@ -588,8 +596,8 @@ static bool grow(struct plan *plan, bool *has_grown, dipole_status *status)
 {
     struct lut_tsm *const lut = plan->lut;
     struct lut_error by_s, by_t;
-    if (!audit(plan, AUDIT_S, POINTS_SEARCHED, LUT_SEED_BAKE, &by_s, status) ||
-        !audit(plan, AUDIT_T, POINTS_SEARCHED, LUT_SEED_BAKE, &by_t, status))
+    if (!audit(plan, AUDIT_S, lut->size[1], LUT_SEED_BAKE, &by_s, status) ||
+        !audit(plan, AUDIT_T, lut->size[1], LUT_SEED_BAKE, &by_t, status))
         return false;
     const bool can_s = lut->size_asked[0] == 0 && lut->size[0] < LUT_TSM_SIDE_MAX;
     const bool can_t = lut->size_asked[1] == 0 && lut->size[1] < LUT_TSM_SIDE_MAX;
@@ -661,17 +669,13 @@ bool lut_tsm_bake(const struct lut_request *request, int thread_count, struct lu
     return is_done;
 }
 
-bool lut_tsm_audit(const struct lut_tsm *lut, size_t count, unsigned seed, struct lut_error *error_out,
+bool lut_tsm_audit(const struct lut_tsm *lut, int depth_count, unsigned seed, struct lut_error *error_out,
                    dipole_status *status)
 {
     struct lut_tsm copy = *lut; /* the plan derives its lengths anew */
     struct plan *plan = NULL;
     const bool is_done =
-        plan_create(&copy, &plan, status) && audit(plan, AUDIT_BOTH, count, seed, error_out, status);
-    if (is_done) {
-        error_out->max += copy.source_error;
-        error_out->p99 += copy.source_error;
-    }
+        plan_create(&copy, &plan, status) && audit(plan, AUDIT_BOTH, depth_count, seed, error_out, status);
     plan_destroy(plan);
     return is_done;
 }
