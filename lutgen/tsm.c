@@ -487,30 +487,36 @@ static void plan_destroy(struct plan *plan)
  * wider one would have coarser cells. */
 static const double extent_epsilon = 0.03;
 
-/* Lengths and samples follow from the material, epsilon and the number of slices. */
-static void samples_find(struct plan *plan)
+void lut_tsm_samples_fill(struct lut_tsm *lut)
+{
+    struct lut_cell cells[LUT_TSM_SAMPLE_LIMIT];
+    lut->sample_count = lut_pattern_cells(lut->size[2], cells);
+    for (int i = 0; i < lut->sample_count; i++)
+        lut->samples[i] =
+            (struct lut_tsm_sample){ .offset_mm = { cells[i].centre[0] * lut->inner_mm,
+                                                    cells[i].centre[1] * lut->inner_mm },
+                                     .width_mm = sqrt(cells[i].area) * lut->inner_mm,
+                                     .area_mm2 = cells[i].area * lut->inner_mm * lut->inner_mm };
+}
+
+/* Lengths and samples follow from the material and the number of slices. */
+static void lengths_find(struct plan *plan)
 {
     struct lut_tsm *const lut = plan->lut;
-    double r_max_mm = 0;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        if (plan->profiles[c].stack)
-            r_max_mm = fmax(r_max_mm, plan->profiles[c].r_max_mm);
-    if (r_max_mm == 0)
-        r_max_mm = plan->profiles[0].r_max_mm;
+    double r_max_mm = 0, shortest_mm = INFINITY;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const struct lut_profile *const profile = &plan->profiles[c];
+        r_max_mm = fmax(r_max_mm, profile->stack ? profile->r_max_mm : 0);
+        shortest_mm = fmin(shortest_mm, profile->mean_free_path_mm);
+    }
+    if (r_max_mm == 0) /* nothing scatters */
+        r_max_mm = shortest_mm;
     lut->inner_mm = 2 * r_max_mm / lut_pattern_extent(lut->size[2]);
     lut->depth_max_mm = r_max_mm;
     lut->depth_scale_mm = lut->inner_mm;
-    lut->local_depth_scale_mm = lut->inner_mm;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        lut->local_depth_scale_mm = fmin(lut->local_depth_scale_mm, plan->profiles[c].mean_free_path_mm);
-    lut->sample_count = lut_pattern_cells(lut->size[2], plan->cells);
-    for (int i = 0; i < lut->sample_count; i++) {
-        const struct lut_cell *const cell = &plan->cells[i];
-        lut->samples[i] = (struct lut_tsm_sample){ .offset_mm = { cell->centre[0] * lut->inner_mm,
-                                                                  cell->centre[1] * lut->inner_mm },
-                                                   .width_mm = sqrt(cell->area) * lut->inner_mm,
-                                                   .area_mm2 = cell->area * lut->inner_mm * lut->inner_mm };
-    }
+    lut->local_depth_scale_mm = fmin(lut->inner_mm, shortest_mm);
+    lut_tsm_samples_fill(lut);
+    lut_pattern_cells(lut->size[2], plan->cells);
 }
 
 static bool sources_find(struct plan *plan, dipole_status *status)
@@ -550,7 +556,7 @@ static bool plan_create(struct lut_tsm *lut, struct plan **plan_out, dipole_stat
     if (!lut_profiles_init(&lut->material, extent_epsilon, plan->profiles, status) ||
         !lut_profiles_check_range(plan->profiles, status))
         return false;
-    samples_find(plan);
+    lengths_find(plan);
     if (!sources_find(plan, status))
         return false;
     classes_find(plan);

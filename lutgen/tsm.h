@@ -22,6 +22,9 @@ int lut_pattern_cells(int slices, struct lut_cell cells[LUT_TSM_SAMPLE_LIMIT]);
 int lut_tsm_kernel_slice(const struct lut_tsm *lut);
 int lut_tsm_depth_slice(const struct lut_tsm *lut);
 
+/* sample_count and samples, from size[2] and inner_mm. */
+void lut_tsm_samples_fill(struct lut_tsm *lut);
+
 double lut_tsm_depth_mm(const struct lut_tsm *lut, double index); /* of a T node, or between */
 double lut_tsm_local_depth_mm(const struct lut_tsm *lut, double index);
 double lut_tsm_local_depth_index(const struct lut_tsm *lut, double dz_mm);
