@@ -36,8 +36,8 @@ enum lut_self_test_result {
 
 /*
  * Say what happened to the patch of a table (is_half: one stored in half): rgb is the slice as it arrived,
- * height rows of width texels of 3 floats, compared within 0.1 %. The one with the fewest flags is
- * returned.
+ * height rows of width texels of 3 floats, compared within 0.1 %, with sRGB within 3 %. The one with the
+ * fewest flags is returned.
  */
 unsigned lut_self_test_check(const float *rgb, int width, int height, bool is_half);
 
