@@ -500,9 +500,16 @@ bool cli_stdout_finish(dipole_status *status)
                        reason ? reason : "some of the output was lost");
 }
 
-/* Leave no half-written file, then end as the signal would have ended the program without us. */
+/*
+ * Leave no half-written file, then end as the signal would have ended the program without us. On the main
+ * thread, which writes the files: one that it is about to make is then not made any more.
+ */
 static void end_by_signal(int number)
 {
+    if (gettid() != getpid()) {
+        tgkill(getpid(), getpid(), number);
+        return;
+    }
     io_file_remove_temporaries();
     signal(number, SIG_DFL);
     sigset_t numbers;
@@ -522,7 +529,7 @@ void cli_start(void)
         /* One that is ignored stays so: nohup, and what a script starts in the background. */
         if (sigaction(numbers[i], NULL, &action) != 0 || action.sa_handler == SIG_IGN)
             continue;
-        action = (struct sigaction){ .sa_handler = end_by_signal };
+        action = (struct sigaction){ .sa_handler = end_by_signal, .sa_flags = SA_RESTART };
         sigfillset(&action.sa_mask); /* one of them at a time */
         sigaction(numbers[i], &action, NULL);
     }

@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <locale.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -465,6 +466,32 @@ static void signals_end_the_program_as_before(void **state)
     }
 }
 
+static void *raise_term(void *unused)
+{
+    raise(SIGTERM);
+    for (;;)
+        pause();
+    return unused;
+}
+
+/* Oracle: as above, when another thread than the main one gets the signal. */
+static void signals_to_any_thread_end_the_program(void **state)
+{
+    (void)state;
+    const pid_t child = fork();
+    if (child == 0) {
+        pthread_t thread;
+        cli_start();
+        if (pthread_create(&thread, NULL, raise_term, NULL) != 0)
+            _exit(5);
+        pthread_join(thread, NULL);
+        _exit(6);
+    }
+    int result = 0;
+    assert_int_equal(waitpid(child, &result, 0), child);
+    assert_true(WIFSIGNALED(result) && WTERMSIG(result) == SIGTERM);
+}
+
 /* Oracle: what could not be printed is a failure, not a signal and not success. */
 static void lost_output_is_a_failure(void **state)
 {
@@ -492,6 +519,7 @@ int main(void)
         cmocka_unit_test(notes_are_quietened_and_progress_needs_a_terminal),
         cmocka_unit_test(progress_is_drawn_on_a_terminal),
         cmocka_unit_test(signals_end_the_program_as_before),
+        cmocka_unit_test(signals_to_any_thread_end_the_program),
         cmocka_unit_test(lost_output_is_a_failure),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
