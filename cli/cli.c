@@ -1,5 +1,7 @@
 #include "cli/cli.h"
 
+#include "io/file.h"
+
 #include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
@@ -498,10 +500,39 @@ bool cli_stdout_finish(dipole_status *status)
                        reason ? reason : "some of the output was lost");
 }
 
+/*
+ * Leave no half-written file, then end as the signal would have ended the program without us. On the main
+ * thread, which writes the files: one that it is about to make is then not made any more.
+ */
+static void end_by_signal(int number)
+{
+    if (gettid() != getpid()) {
+        tgkill(getpid(), getpid(), number);
+        return;
+    }
+    io_file_remove_temporaries();
+    signal(number, SIG_DFL);
+    sigset_t numbers;
+    sigemptyset(&numbers);
+    sigaddset(&numbers, number);
+    sigprocmask(SIG_UNBLOCK, &numbers, NULL);
+    raise(number);
+}
+
 void cli_start(void)
 {
+    static const int numbers[] = { SIGHUP, SIGINT, SIGTERM };
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action = { 0 };
+        /* One that is ignored stays so: nohup, and what a script starts in the background. */
+        if (sigaction(numbers[i], NULL, &action) != 0 || action.sa_handler == SIG_IGN)
+            continue;
+        action = (struct sigaction){ .sa_handler = end_by_signal, .sa_flags = SA_RESTART };
+        sigfillset(&action.sa_mask); /* one of them at a time */
+        sigaction(numbers[i], &action, NULL);
+    }
 }
 
 /* ---- progress ------------------------------------------------------------------------------------- */

@@ -95,7 +95,11 @@ bool cli_stdout_finish(dipole_status *status);
 /* Monotonic clock. */
 double cli_now_s(void);
 
-/* Ignore SIGXFSZ and SIGPIPE, so that a full disk or a closed pipe is an error code; call first. */
+/*
+ * Call first. SIGXFSZ and SIGPIPE are ignored, so that a full disk or a closed pipe is an error code.
+ * SIGHUP, SIGINT and SIGTERM still end the program, whose status says so, but remove the temporary files of
+ * io_file_write() before; where they were ignored they still are.
+ */
 void cli_start(void);
 
 #endif
