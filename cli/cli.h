@@ -18,6 +18,7 @@ enum cli_kind {
     CLI_TEXT,     /* target: const char **                                         */
     CLI_NUMBER,   /* target: double *, min..max                                    */
     CLI_CHOICE,   /* target: int *, index into choices                             */
+    CLI_CHOICES,  /* target: unsigned *, comma separated, bit i for choices[i]     */
     CLI_SIZE,     /* target: int[2], WxH, each min..max                            */
     CLI_RANGE,    /* target: int[2], A:B or A, each min..max, A <= B               */
     CLI_NUMBERS,  /* target: struct cli_numbers *, comma separated, each min..max  */

@@ -192,30 +192,41 @@ static int create_temporary(const char *folder, int place, char temporary[PATH_M
     return -1;
 }
 
-/* Write under a temporary name and rename; errno says why not. */
-static bool write_and_rename(const char *path, const char *folder, int place, const void *data, size_t size)
+/* Bytes on disk before the file is closed; errno says why not. */
+static bool fill_and_close(int file, const void *data, size_t size)
+{
+    const bool is_full = write_all(file, data, size) && fsync(file) == 0;
+    const int error = errno;
+    const bool is_closed = close(file) == 0;
+    if (!is_full)
+        errno = error;
+    return is_full && is_closed;
+}
+
+/* Write under a temporary name, check, and rename. */
+static bool write_and_rename(const char *path, const char *folder, int place, const void *data, size_t size,
+                             io_file_check *check, void *context, dipole_status *status)
 {
     char temporary[PATH_MAX];
     const int file = create_temporary(folder, place, temporary);
     if (file < 0)
-        return false;
-    bool done = write_all(file, data, size) && fsync(file) == 0;
-    int error = errno;
-    if (close(file) != 0 && done) {
-        done = false;
-        error = errno;
-    }
-    if (done && rename(temporary, path) != 0) {
-        done = false;
-        error = errno;
-    }
+        return fail_at_path(status, path, "cannot be written", errno);
+    bool done = fill_and_close(file, data, size) || fail_at_path(status, path, "cannot be written", errno);
+    done = done && (!check || check(context, temporary, status));
+    done = done &&
+           (rename(temporary, path) == 0 || fail_at_path(status, path, "cannot be written", errno));
     if (!done)
         unlink(temporary);
-    errno = error;
     return done;
 }
 
 bool io_file_write(const char *path, const void *data, size_t size, dipole_status *status)
+{
+    return io_file_write_checked(path, data, size, NULL, NULL, status);
+}
+
+bool io_file_write_checked(const char *path, const void *data, size_t size, io_file_check *check,
+                           void *context, dipole_status *status)
 {
     struct stat info;
     if (stat(path, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode))
@@ -225,10 +236,9 @@ bool io_file_write(const char *path, const void *data, size_t size, dipole_statu
     if (!folder_of(path, folder))
         return fail_at_path(status, path, "cannot be written", ENAMETOOLONG);
     const int place = place_claim();
-    const bool done = write_and_rename(path, folder, place, data, size);
-    const int error = errno;
+    const bool done = write_and_rename(path, folder, place, data, size, check, context, status);
     place_set(place, PLACE_FREE);
-    return done || fail_at_path(status, path, "cannot be written", error);
+    return done;
 }
 
 bool io_file_check_writable(const char *path, dipole_status *status)
