@@ -361,7 +361,7 @@ typedef struct dipole_sources {
  *
  * Fails with DIPOLE_BAD_VALUE; with DIPOLE_NOT_SUPPORTED where the beam model's sum would be longer than
  * DIPOLE_SOURCE_LIMIT; with DIPOLE_NOT_CONVERGED, naming what was reached, where a fit comes no nearer.
- * *out is then undefined.
+ * *out is then undefined. Allocates nothing; a fit takes half a megabyte of stack.
  */
 DIPOLE_API DIPOLE_CHECKED bool dipole_sources_init(const dipole_stack *stack, double epsilon,
                                                    double r_min_mm, double r_max_mm, dipole_sources *out,

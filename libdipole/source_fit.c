@@ -218,7 +218,7 @@ static void settle(struct fit *fit)
 
 /* ---- sources ------------------------------------------------------------------------------------- */
 
-/* Without what would be another row of nothing but zeros. */
+/* Left out where it reaches no radius. */
 static void column_append(struct fit *fit, const struct samples *samples, double power,
                           const dipole_source *source)
 {
