@@ -320,8 +320,8 @@ bool io_exr_write(const char *path, const struct io_image *image, bool is_half, 
     return io_exr_write_checked(path, image, is_half, NULL, NULL, status);
 }
 
-bool io_exr_write_checked(const char *path, const struct io_image *image, bool is_half, io_file_check *check,
-                          void *context, dipole_status *status)
+bool io_exr_write_checked(const char *path, const struct io_image *image, bool is_half,
+                          io_file_check *check, void *check_context, dipole_status *status)
 {
     if (is_half && !io_half_check(path, image, status))
         return false;
@@ -341,7 +341,7 @@ bool io_exr_write_checked(const char *path, const struct io_image *image, bool i
     if (result == EXR_ERR_SUCCESS)
         result = finished;
     const bool done = result == EXR_ERR_SUCCESS
-                          ? io_file_write_checked(path, stream.data, stream.size, check, context, status)
+                          ? io_file_write_checked(path, stream.data, stream.size, check, check_context, status)
                           : fail_at_exr(path, &stream, "cannot be written as EXR", result, status);
     free(stream.data);
     return done;

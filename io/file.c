@@ -212,9 +212,13 @@ static bool write_and_rename(const char *path, const char *folder, int place, co
     if (file < 0)
         return fail_at_path(status, path, "cannot be written", errno);
     bool done = fill_and_close(file, data, size) || fail_at_path(status, path, "cannot be written", errno);
-    done = done && (!check || check(context, temporary, status));
-    done = done &&
-           (rename(temporary, path) == 0 || fail_at_path(status, path, "cannot be written", errno));
+    if (done && check && !check(context, temporary, status)) {
+        done = false;
+        if (status && strncmp(status->source, temporary, sizeof status->source - 1) ==
+                          0) /* a name that nobody has heard of */
+            snprintf(status->source, sizeof status->source, "%s", path);
+    }
+    done = done && (rename(temporary, path) == 0 || fail_at_path(status, path, "cannot be written", errno));
     if (!done)
         unlink(temporary);
     return done;

@@ -81,6 +81,7 @@ static bool exr_is_current(struct lut_job *job, const char *hash)
                             table_from_image(job, image, path, &table, NULL);
     if (is_current) {
         job->error = table_error(&table);
+        job->depth = table.tsm ? table.tsm->size[2] : 1;
         job->image = image;
         image = NULL;
     }
@@ -116,7 +117,8 @@ static bool sidecar_is_current(const struct lut_job *job, enum lut_format format
     return is_current;
 }
 
-/* Only an EXR file can be read back as a table; without one the others are made anew, which costs a bake. */
+/* Only an EXR file can be read back as a table; without one the others are made anew, which costs a bake.
+ */
 void lut_job_find_current(struct lut_job *job)
 {
     const struct lut_hash hash = lut_request_hash(&job->request);
@@ -125,7 +127,6 @@ void lut_job_find_current(struct lut_job *job)
         if (job->formats >> i & 1U)
             job->is_current = i == LUT_EXR ? exr_is_current(job, hash.text)
                                            : sidecar_is_current(job, (enum lut_format)i, hash.text);
-    job->depth = job->request.kind == LUT_TSM && job->image ? job->image->width_px : 1;
 }
 
 /* ---- baking ------------------------------------------------------------------------------------- */
@@ -197,12 +198,12 @@ static bool image_audit(const struct lut_job *job, const struct io_image *image,
     struct table table = { 0 };
     struct lut_error error;
     const double stated = job->error.max;
-    const bool is_done = table_from_image(job, image, path, &table, status) &&
-                         table_audit(&table, &error, status) &&
-                         (error.max <= stated ||
-                          dipole_fail(status, DIPOLE_IO_FAILED, NULL,
-                                      "read back, the table errs by %.3g, which is more than the stated %.3g",
-                                      error.max, stated));
+    const bool is_done =
+        table_from_image(job, image, path, &table, status) && table_audit(&table, &error, status) &&
+        (error.max <= stated ||
+         dipole_fail(status, DIPOLE_IO_FAILED, NULL,
+                     "read back, the table errs by %.3g, which is more than the stated %.3g", error.max,
+                     stated));
     table_end(&table);
     return is_done;
 }
@@ -251,11 +252,10 @@ bool lut_job_plot(const struct lut_job *job, dipole_status *status)
     size_t size;
     struct table table = { 0 };
     snprintf(path, sizeof path, "%s.svg", job->stem);
-    const bool is_done =
-        table_from_image(job, job->image, path, &table, status) &&
-        (table.tsm ? lut_tsm_figure_create(table.tsm, &svg, &size, status)
-                   : lut_splat_figure_create(table.splat, &svg, &size, status)) &&
-        io_file_write(path, svg, size, status);
+    const bool is_done = table_from_image(job, job->image, path, &table, status) &&
+                         (table.tsm ? lut_tsm_figure_create(table.tsm, &svg, &size, status)
+                                    : lut_splat_figure_create(table.splat, &svg, &size, status)) &&
+                         io_file_write(path, svg, size, status);
     free(svg);
     table_end(&table);
     return is_done;

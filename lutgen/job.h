@@ -23,8 +23,8 @@ struct lut_job {
     double bake_ms;
 };
 
-/* Whether all files of the job are there, were baked from the same request by this version, and hold what they
- * say; the picture is then read from the first format that keeps it. */
+/* Whether all files of the job are there, were baked from the same request by this version, and hold what
+ * they say; the picture is then read from the first format that keeps it. */
 void lut_job_find_current(struct lut_job *job);
 
 /* Bake in memory. Fails with the material's file, or as lut_splat_bake and lut_tsm_bake do. */

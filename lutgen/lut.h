@@ -190,8 +190,8 @@ DIPOLE_CHECKED bool lut_tsm_audit(const struct lut_tsm *lut, int depth_count, un
 /* Picture and file, as of splat tables. */
 DIPOLE_CHECKED bool lut_tsm_to_image(const struct lut_tsm *lut, struct io_image **image_out,
                                      dipole_status *status);
-DIPOLE_CHECKED bool lut_tsm_from_image(const struct io_image *image, const char *path, struct lut_tsm **lut_out,
-                                       dipole_status *status);
+DIPOLE_CHECKED bool lut_tsm_from_image(const struct io_image *image, const char *path,
+                                       struct lut_tsm **lut_out, dipole_status *status);
 DIPOLE_CHECKED bool lut_tsm_read(const char *path, struct lut_tsm **lut_out, dipole_status *status);
 
 #endif
