@@ -120,7 +120,7 @@ double lut_random(uint64_t *state);
 
 /* ---- errors ------------------------------------------------------------------------------------- */
 
-/* Sorts errors (count > 0). */
+/* Reorders errors (count > 0, none NaN). */
 struct lut_error lut_error_of(double *errors, size_t count);
 
 #endif

@@ -162,14 +162,42 @@ double lut_random(uint64_t *state)
     return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
-static int ascending(const void *a, const void *b)
+/* The value that would stand at index if values were sorted (Hoare's selection); reorders them. */
+static double select_at(double *values, size_t count, size_t index)
 {
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
+    size_t low = 0, high = count - 1;
+    while (low < high) {
+        const double pivot = values[low + (high - low) / 2];
+        size_t i = low, j = high;
+        while (i <= j) {
+            while (values[i] < pivot)
+                i++;
+            while (values[j] > pivot)
+                j--;
+            if (i > j)
+                break;
+            const double value = values[i];
+            values[i++] = values[j];
+            values[j] = value;
+            if (j == 0)
+                break;
+            j--;
+        }
+        if (index <= j)
+            high = j;
+        else if (index >= i)
+            low = i;
+        else
+            return values[index];
+    }
+    return values[index];
 }
 
 struct lut_error lut_error_of(double *errors, size_t count)
 {
     assert(count > 0);
-    qsort(errors, count, sizeof *errors, ascending);
-    return (struct lut_error){ .max = errors[count - 1], .p99 = errors[(count * 99 + 99) / 100 - 1] };
+    double most = 0;
+    for (size_t i = 0; i < count; i++)
+        most = fmax(most, errors[i]);
+    return (struct lut_error){ .max = most, .p99 = select_at(errors, count, (count * 99 + 99) / 100 - 1) };
 }

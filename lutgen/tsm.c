@@ -103,7 +103,7 @@ static void volume_round(struct lut_tsm *lut)
  * ---------------------------------------------------------------------------------- */
 
 /* What lies between the points of an audit can be so much larger. */
-static const double audit_margin = 1.15;
+static const double audit_margin = 1.25;
 
 static bool try_size(struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
 {
