@@ -375,11 +375,11 @@ static void splat_glsl_is_the_documented_formula(void **state)
 
 /* ---- volumes ----------------------------------------------------------------------------------------- */
 
-enum { TSM_S = 16, TSM_T = 24, TSM_R = 8, TSM_SAMPLES = 5, TSM_LOCAL = 5, TSM_PROXIMITY = 6 };
+enum { TSM_S = 16, TSM_T = 24, TSM_R = 8, TSM_SAMPLES = 5, TSM_LOCAL = 5, TSM_FACTOR = 6 };
 
 static const struct {
-    double depth_scale_mm, depth_max_mm, local_width_mm, scale[3];
-} tsm = { 0.4, 30, 0.25, { 0.125, 2, 1 } };
+    double depth_scale_mm, depth_max_mm, local_width_mm, local_depth_scale_mm, inner_mm, scale[3];
+} tsm = { 0.4, 30, 0.25, 0.2, 1.75, { 0.125, 2, 1 } };
 
 static size_t tsm_at(int s, int t, int r, int channel)
 {
@@ -422,18 +422,20 @@ static double tsm_bilinear(const struct io_image *image, double s, double t, int
 static double tsm_expected(const struct io_image *image, const float *query, int channel)
 {
     const double dz_mm = (double)query[3];
-    if (fabs(dz_mm) > tsm.depth_max_mm)
-        return 0;
-    const double t =
-        (0.5 + 0.5 * asinh(dz_mm / tsm.depth_scale_mm) / asinh(tsm.depth_max_mm / tsm.depth_scale_mm)) *
-        (TSM_T - 1);
     const int which = (int)query[7];
+    if (fabs(dz_mm) > (which < 0 ? tsm.inner_mm : tsm.depth_max_mm))
+        return 0;
     if (which < 0) {
         const int cell = -1 - which;
         const double kernel = (double)image->pixels[tsm_at(cell % 7, cell / 7, TSM_LOCAL, channel)];
-        return kernel * tsm.scale[channel] * tsm_bilinear(image, 0, t, TSM_PROXIMITY, channel) *
+        const double s = asinh(fabs(dz_mm) / tsm.local_depth_scale_mm) /
+                         asinh(tsm.inner_mm / tsm.local_depth_scale_mm) * (TSM_S - 1);
+        return kernel * tsm.scale[channel] * tsm_bilinear(image, s, dz_mm < 0, TSM_FACTOR, channel) *
                tsm.local_width_mm * tsm.local_width_mm;
     }
+    const double t =
+        (0.5 + 0.5 * asinh(dz_mm / tsm.depth_scale_mm) / asinh(tsm.depth_max_mm / tsm.depth_scale_mm)) *
+        (TSM_T - 1);
     double dot = 0, square = 0;
     for (int i = 0; i < 3; i++) {
         dot += (double)query[i] * (double)query[4 + i];
@@ -474,11 +476,11 @@ static void tsm_queries(float queries[QUERY_COUNT * WORDS])
 
 static const char tsm_answer[] =
     "uniform DIPOLE_TSM_SAMPLER texels;\n"
-    "uniform float depth_scale_mm, depth_max_mm, local_width_mm;\n"
+    "uniform float depth_scale_mm, depth_max_mm, local_width_mm, local_depth_scale_mm, inner_mm;\n"
     "uniform vec3 scale;\n"
     "vec3 answer(vec4 a, vec4 b) {\n"
-    "  dipole_tsm table = dipole_tsm(ivec3(16, 24, 8), depth_scale_mm, depth_max_mm, scale, 5, 6, "
-    "local_width_mm);\n"
+    "  dipole_tsm table = dipole_tsm(ivec3(16, 24, 8), depth_scale_mm, depth_max_mm, scale, 5, 6,\n"
+    "                                local_width_mm, local_depth_scale_mm, inner_mm);\n"
     "  int which = int(b.w);\n"
     "  return which < 0 ? dipole_tsm_local(texels, table, ivec2((-1 - which) % 7, (-1 - which) / 7), a.w)\n"
     "                   : dipole_tsm_response_per_mm2(texels, table, which, a.xyz, b.xyz, a.w); }\n";
@@ -506,6 +508,8 @@ static void tsm_glsl_is_the_documented_formula(void **state)
             render_set_float(program, "depth_scale_mm", tsm.depth_scale_mm);
             render_set_float(program, "depth_max_mm", tsm.depth_max_mm);
             render_set_float(program, "local_width_mm", tsm.local_width_mm);
+            render_set_float(program, "local_depth_scale_mm", tsm.local_depth_scale_mm);
+            render_set_float(program, "inner_mm", tsm.inner_mm);
             render_set_vec3(program, "scale", tsm.scale);
             ask(program, texture, queries, rgba[kind]);
             glDeleteTextures(1, &texture);
