@@ -135,6 +135,7 @@ const struct io_attribute *io_image_find(const struct io_image *image, const cha
 struct stream {
     char *data;
     size_t size, capacity;
+    bool is_out_of_memory;
     char error[160];
 };
 
@@ -147,6 +148,13 @@ static void keep_error(exr_const_context_t context, exr_result_t code, const cha
     struct stream *stream = user_data;
     if (!stream->error[0])
         snprintf(stream->error, sizeof stream->error, "%s", message);
+}
+
+/* While it writes, the library reports errors with its context locked, and asking for the stream would wait
+ * for ever; the code that it returns has to do. */
+static void ignore_error(exr_const_context_t context, exr_result_t code, const char *message)
+{
+    (void)context, (void)code, (void)message;
 }
 
 static int64_t read_stream(exr_const_context_t context, void *user_data, void *buffer, uint64_t size,
@@ -171,13 +179,14 @@ static int64_t stream_size(exr_const_context_t context, void *user_data)
 static int64_t write_stream(exr_const_context_t context, void *user_data, const void *buffer, uint64_t size,
                             uint64_t offset, exr_stream_error_func_ptr_t fail)
 {
+    (void)context, (void)fail;
     struct stream *stream = user_data;
     const size_t end = (size_t)offset + (size_t)size;
     if (end > stream->capacity) {
         const size_t capacity = end > 2 * stream->capacity ? end : 2 * stream->capacity;
         char *data = realloc(stream->data, capacity);
         if (!data) {
-            fail(context, EXR_ERR_OUT_OF_MEMORY, "no memory for %zu bytes", capacity);
+            stream->is_out_of_memory = true;
             return -1;
         }
         memset(data + stream->capacity, 0, capacity - stream->capacity);
@@ -194,6 +203,8 @@ static bool fail_at_exr(const char *path, const struct stream *stream, const cha
                         dipole_status *status)
 {
     const dipole_place place = { .source = path };
+    if (stream->is_out_of_memory)
+        code = EXR_ERR_OUT_OF_MEMORY;
     return dipole_fail(status, code == EXR_ERR_OUT_OF_MEMORY ? DIPOLE_OUT_OF_MEMORY : DIPOLE_BAD_SYNTAX,
                        &place, "%s: %s", what,
                        stream->error[0] ? stream->error : exr_get_default_error_message(code));
@@ -327,7 +338,7 @@ bool io_exr_write_checked(const char *path, const struct io_image *image, bool i
         return false;
     struct stream stream = { 0 };
     exr_context_initializer_t initializer = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    initializer.error_handler_fn = keep_error;
+    initializer.error_handler_fn = ignore_error;
     initializer.user_data = &stream;
     initializer.write_fn = write_stream;
 

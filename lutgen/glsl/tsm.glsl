@@ -15,8 +15,8 @@ struct dipole_tsm {
     ivec3 size;  // S, T, R
     float depth_scale_mm, depth_max_mm;
     vec3 scale;
-    int local_slice, proximity_slice;
-    float local_width_mm;
+    int local_slice, depth_factor_slice;
+    float local_width_mm, local_depth_scale_mm, inner_mm;
 };
 
 // s and t count texels from the centre of the first.
@@ -57,10 +57,12 @@ vec3 dipole_tsm_response_per_mm2(DIPOLE_TSM_SAMPLER texels, dipole_tsm table, in
 // per mm^2 of the cell it is radiosity. dz_mm: how much deeper x_out lies than the surface in that cell.
 vec3 dipole_tsm_local(DIPOLE_TSM_SAMPLER texels, dipole_tsm table, ivec2 cell, float dz_mm)
 {
-    if (!(abs(dz_mm) <= table.depth_max_mm))
+    if (!(abs(dz_mm) <= table.inner_mm))
         return vec3(0.0);
     vec3 kernel_per_mm2 =
         dipole_tsm_texel(texels, table, float(cell.x), float(cell.y), table.local_slice) * table.scale;
-    vec3 proximity = dipole_tsm_texel(texels, table, 0.0, dipole_tsm_t(table, dz_mm), table.proximity_slice);
-    return kernel_per_mm2 * proximity * (table.local_width_mm * table.local_width_mm);
+    float end = asinh(table.inner_mm / table.local_depth_scale_mm);
+    float s = asinh(abs(dz_mm) / table.local_depth_scale_mm) / end * float(table.size.x - 1);
+    vec3 factor = dipole_tsm_texel(texels, table, s, dz_mm < 0.0 ? 1.0 : 0.0, table.depth_factor_slice);
+    return kernel_per_mm2 * factor * (table.local_width_mm * table.local_width_mm);
 }
