@@ -6,16 +6,25 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Cosines at each depth, one in each of as many parts. */
-enum { COSINES = 16 };
+/* Most cosines at each depth, one in each of as many parts: one in each interval up to as many. */
+enum { COSINE_LIMIT = 64 };
 
-/* A random index of an axis in part `part` of `parts`: in the middle between two nodes, where linear
- * interpolation errs most, or anywhere, or at a node. */
-static double index_choose(uint64_t *random, int node_count, int part, int parts, bool is_off_grid)
+/* An index of an axis in part `part` of `parts`: at a node; in the middle between two, where linear
+ * interpolation errs most; or anywhere. */
+enum place { AT_NODE, IN_MIDDLE, ANYWHERE };
+
+static double index_choose(uint64_t *random, int node_count, int part, int parts, enum place place)
 {
     const double x = (part + lut_random(random)) / parts * (node_count - 1);
-    const bool is_middle = lut_random(random) < 0.5;
-    return !is_off_grid ? round(x) : is_middle ? fmin(floor(x), node_count - 2) + 0.5 : x;
+    switch (place) {
+    case AT_NODE:
+        return round(x);
+    case IN_MIDDLE:
+        return fmin(floor(x), node_count - 2) + 0.5;
+    case ANYWHERE:
+        break;
+    }
+    return x;
 }
 
 /* Rounds of the audit: depths of the volume, then depth factors of the local response in the middle between
@@ -23,34 +32,38 @@ static double index_choose(uint64_t *random, int node_count, int part, int parts
 struct audit {
     const struct lut_tsm_plan *plan;
     enum lut_tsm_audit_kind kind;
-    int depth_count;
+    int depth_count, cosine_count;
     unsigned seed;
     size_t room; /* errors of one round */
     double *errors;
     struct lut_tsm_work *works;
 };
 
-/* Errors at one depth, for every sample and channel at some cosines. */
+/* Errors at one depth, for every sample and channel at some cosines: of two rounds one is in the middle
+ * along both axes, so that with two rounds to an interval of T no middle is left out. */
 static void depth_audit(const struct audit *audit, int round, uint64_t *random, double *errors)
 {
     const struct lut_tsm_plan *const plan = audit->plan;
     const struct lut_tsm *const lut = plan->lut;
     const struct lut_tsm_work *const work = &audit->works[round];
-    const double t =
-        index_choose(random, lut->size[1], round, audit->depth_count, audit->kind != LUT_AUDIT_S);
+    const int cosine_count = audit->cosine_count;
+    const enum place off_grid = round % 2 == 0 ? IN_MIDDLE : ANYWHERE;
+    const double t = index_choose(random, lut->size[1], round, audit->depth_count,
+                                  audit->kind == LUT_AUDIT_S ? AT_NODE : off_grid);
     const double dz_mm = lut_tsm_depth_mm(lut, t);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (!plan->profiles[c].stack)
             continue;
         lut_tsm_means_find(plan, c, dz_mm, work);
         for (int r = 0; r < lut->sample_count; r++) {
-            for (int k = 0; k < COSINES; k++) {
-                const double s = index_choose(random, lut->size[0], k, COSINES, audit->kind != LUT_AUDIT_T);
+            for (int k = 0; k < cosine_count; k++) {
+                const double s = index_choose(random, lut->size[0], k, cosine_count,
+                                              audit->kind == LUT_AUDIT_T ? AT_NODE : off_grid);
                 work->cosines[k] = 2 * s / (lut->size[0] - 1) - 1;
             }
-            lut_tsm_response(plan, c, r, dz_mm, COSINES, work);
+            lut_tsm_response(plan, c, r, dz_mm, (size_t)cosine_count, work);
             const double part = lut_tsm_global_part(plan, r, dz_mm);
-            for (int k = 0; k < COSINES; k++) {
+            for (int k = 0; k < cosine_count; k++) {
                 double sampled[IO_CHANNEL_COUNT];
                 lut_tsm_sample(lut, r, work->cosines[k], dz_mm, sampled);
                 *errors++ = fabs(sampled[c] - part * work->values[k]) /
@@ -102,17 +115,19 @@ bool lut_tsm_plan_audit(const struct lut_tsm_plan *plan, enum lut_tsm_audit_kind
                         unsigned seed, int thread_count, struct lut_error *error_out, dipole_status *status)
 {
     const int rounds = depth_count + (kind == LUT_AUDIT_BOTH ? 2 * (plan->lut->size[0] - 1) : 0);
+    const int intervals = plan->lut->size[0] - 1;
     struct audit audit = { .plan = plan,
                            .kind = kind,
                            .depth_count = depth_count,
-                           .seed = seed,
-                           .room = (size_t)plan->lut->sample_count * COSINES * IO_CHANNEL_COUNT };
+                           .cosine_count = intervals < COSINE_LIMIT ? intervals : COSINE_LIMIT,
+                           .seed = seed };
+    audit.room = (size_t)plan->lut->sample_count * (size_t)audit.cosine_count * IO_CHANNEL_COUNT;
     const size_t count = (size_t)rounds * audit.room;
     audit.errors = calloc(count, sizeof *audit.errors);
     audit.works = calloc((size_t)rounds, sizeof *audit.works);
     bool is_done = audit.errors && audit.works;
     for (int i = 0; i < rounds && is_done; i++)
-        is_done = lut_tsm_work_create(plan, COSINES, &audit.works[i]);
+        is_done = lut_tsm_work_create(plan, (size_t)audit.cosine_count, &audit.works[i]);
     if (is_done) {
         lut_parallel_for(rounds, thread_count, round_run, &audit);
         *error_out = errors_sum(&audit, rounds);
