@@ -328,6 +328,12 @@ static exr_result_t write_chunks(exr_context_t context, const struct io_image *i
 
 bool io_exr_write(const char *path, const struct io_image *image, bool is_half, dipole_status *status)
 {
+    return io_exr_write_checked(path, image, is_half, NULL, NULL, status);
+}
+
+bool io_exr_write_checked(const char *path, const struct io_image *image, bool is_half,
+                          io_file_check *check, void *check_context, dipole_status *status)
+{
     if (is_half && !io_half_check(path, image, status))
         return false;
     struct stream stream = { 0 };
@@ -346,7 +352,7 @@ bool io_exr_write(const char *path, const struct io_image *image, bool is_half, 
     if (result == EXR_ERR_SUCCESS)
         result = finished;
     const bool done = result == EXR_ERR_SUCCESS
-                          ? io_file_write(path, stream.data, stream.size, status)
+                          ? io_file_write_checked(path, stream.data, stream.size, check, check_context, status)
                           : fail_at_exr(path, &stream, "cannot be written as EXR", result, status);
     free(stream.data);
     return done;

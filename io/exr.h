@@ -2,7 +2,7 @@
 #ifndef IO_EXR_H
 #define IO_EXR_H
 
-#include "libdipole/dipole.h"
+#include "io/file.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -54,6 +54,10 @@ const struct io_attribute *io_image_find(const struct io_image *image, const cha
  * table would be silently wrong. */
 DIPOLE_CHECKED bool io_exr_write(const char *path, const struct io_image *image, bool is_half,
                                  dipole_status *status);
+
+/* The same, as io_file_write_checked. */
+DIPOLE_CHECKED bool io_exr_write_checked(const char *path, const struct io_image *image, bool is_half,
+                                         io_file_check *check, void *context, dipole_status *status);
 
 /* Read scanline or tiled RGB(A) or single-channel EXR: the first part, the largest level, every compression
  * but DWA. Texts, doubles and v3d whose name starts with "dipole:" are kept as attributes; more or longer

@@ -4,6 +4,8 @@
 
 #include <fcntl.h>
 #include <locale.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -441,6 +443,55 @@ static void print_well(void)
     _exit(cli_stdout_finish(NULL) ? 0 : 1);
 }
 
+/* Oracle: wait(2): a signal ends the program and the status names it, as without us; one that was ignored
+ * still is. */
+static void signals_end_the_program_as_before(void **state)
+{
+    (void)state;
+    static const int numbers[] = { SIGHUP, SIGINT, SIGTERM };
+    for (int i = 0; i < 6; i++) {
+        const int number = numbers[i % 3];
+        const bool is_ignored = i >= 3;
+        const pid_t child = fork();
+        if (child == 0) {
+            signal(number, is_ignored ? SIG_IGN : SIG_DFL);
+            cli_start();
+            raise(number);
+            _exit(5);
+        }
+        int result = 0;
+        assert_int_equal(waitpid(child, &result, 0), child);
+        assert_int_equal(WIFSIGNALED(result) ? WTERMSIG(result) : 0, is_ignored ? 0 : number);
+        assert_true(!is_ignored || WEXITSTATUS(result) == 5);
+    }
+}
+
+static void *raise_term(void *unused)
+{
+    raise(SIGTERM);
+    for (;;)
+        pause();
+    return unused;
+}
+
+/* Oracle: as above, when another thread than the main one gets the signal. */
+static void signals_to_any_thread_end_the_program(void **state)
+{
+    (void)state;
+    const pid_t child = fork();
+    if (child == 0) {
+        pthread_t thread;
+        cli_start();
+        if (pthread_create(&thread, NULL, raise_term, NULL) != 0)
+            _exit(5);
+        pthread_join(thread, NULL);
+        _exit(6);
+    }
+    int result = 0;
+    assert_int_equal(waitpid(child, &result, 0), child);
+    assert_true(WIFSIGNALED(result) && WTERMSIG(result) == SIGTERM);
+}
+
 /* Oracle: what could not be printed is a failure, not a signal and not success. */
 static void lost_output_is_a_failure(void **state)
 {
@@ -467,6 +518,8 @@ int main(void)
         cmocka_unit_test(a_report_names_the_place),
         cmocka_unit_test(notes_are_quietened_and_progress_needs_a_terminal),
         cmocka_unit_test(progress_is_drawn_on_a_terminal),
+        cmocka_unit_test(signals_end_the_program_as_before),
+        cmocka_unit_test(signals_to_any_thread_end_the_program),
         cmocka_unit_test(lost_output_is_a_failure),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -221,6 +221,49 @@ static void a_reader_never_sees_half_a_file(void **state)
     assert_int_equal(entry_count("."), 1);
 }
 
+static void remove_and_exit(int number)
+{
+    (void)number;
+    io_file_remove_temporaries(); /* NOLINT(bugprone-signal-handler): made for it */
+    _exit(7);
+}
+
+/* Oracle: the folder; whatever moment a signal comes, its handler leaves one whole version and nothing
+ * else. */
+static void a_signal_leaves_no_temporary(void **state)
+{
+    (void)state;
+    enum { SIZE = 300000, ROUNDS = 100 };
+    static char block[SIZE];
+    struct rng rng = { .seed = 5 };
+    assert_true(io_file_write("file", block, SIZE, NULL));
+    for (int i = 0; i < ROUNDS; i++) {
+        const pid_t child = fork();
+        if (child == 0) {
+            signal(SIGTERM, remove_and_exit);
+            for (int k = 0;; k++) {
+                memset(block, k, SIZE);
+                if (!io_file_write("file", block, SIZE, NULL))
+                    _exit(1);
+            }
+        }
+        usleep((useconds_t)log_uniform(&rng, 500, 5000));
+        kill(child, SIGTERM);
+        int result = 0;
+        waitpid(child, &result, 0);
+        assert_true((WIFEXITED(result) && WEXITSTATUS(result) == 7) || WTERMSIG(result) == SIGTERM);
+        char *data;
+        size_t size;
+        assert_true(io_file_read("file", SIZE, &data, &size, NULL));
+        assert_int_equal(size, SIZE);
+        assert_memory_equal(data, data + 1, SIZE - 1);
+        free(data);
+        assert_int_equal(entry_count("."), 1);
+    }
+    io_file_remove_temporaries(); /* nothing is being written: nothing goes */
+    assert_int_equal(entry_count("."), 1);
+}
+
 /* Oracle: io_file_write's own verdict on the same path. */
 static void check_writable_foretells_write(void **state)
 {
@@ -348,6 +391,7 @@ int main(void)
         in_empty_folder(a_full_disk_leaves_the_old_file),
         in_empty_folder(a_device_is_written_to_and_not_replaced),
         in_empty_folder(a_reader_never_sees_half_a_file),
+        in_empty_folder(a_signal_leaves_no_temporary),
         in_empty_folder(check_writable_foretells_write),
         in_empty_folder(folders_are_made_with_their_parents),
         in_empty_folder(references_stay_under_their_folder),

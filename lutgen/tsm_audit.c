@@ -1,0 +1,137 @@
+/* The audit of a translucent-shadow-map volume. T32. */
+#include "lutgen/tsm.h"
+
+#include "lutgen/parallel.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Cosines at each depth, one in each of as many parts. */
+enum { COSINES = 16 };
+
+/* A random index of an axis in part `part` of `parts`: in the middle between two nodes, where linear
+ * interpolation errs most, or anywhere, or at a node. */
+static double index_choose(uint64_t *random, int node_count, int part, int parts, bool is_off_grid)
+{
+    const double x = (part + lut_random(random)) / parts * (node_count - 1);
+    const bool is_middle = lut_random(random) < 0.5;
+    return !is_off_grid ? round(x) : is_middle ? fmin(floor(x), node_count - 2) + 0.5 : x;
+}
+
+/* Rounds of the audit: depths of the volume, then depth factors of the local response in the middle between
+ * two nodes on either side. Each has its own random numbers and its own room for errors. */
+struct audit {
+    const struct lut_tsm_plan *plan;
+    enum lut_tsm_audit_kind kind;
+    int depth_count;
+    unsigned seed;
+    size_t room; /* errors of one round */
+    double *errors;
+    struct lut_tsm_work *works;
+};
+
+/* Errors at one depth, for every sample and channel at some cosines. */
+static void depth_audit(const struct audit *audit, int round, uint64_t *random, double *errors)
+{
+    const struct lut_tsm_plan *const plan = audit->plan;
+    const struct lut_tsm *const lut = plan->lut;
+    const struct lut_tsm_work *const work = &audit->works[round];
+    const double t =
+        index_choose(random, lut->size[1], round, audit->depth_count, audit->kind != LUT_AUDIT_S);
+    const double dz_mm = lut_tsm_depth_mm(lut, t);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!plan->profiles[c].stack)
+            continue;
+        lut_tsm_means_find(plan, c, dz_mm, work);
+        for (int r = 0; r < lut->sample_count; r++) {
+            for (int k = 0; k < COSINES; k++) {
+                const double s = index_choose(random, lut->size[0], k, COSINES, audit->kind != LUT_AUDIT_T);
+                work->cosines[k] = 2 * s / (lut->size[0] - 1) - 1;
+            }
+            lut_tsm_response(plan, c, r, dz_mm, COSINES, work);
+            const double part = lut_tsm_global_part(plan, r, dz_mm);
+            for (int k = 0; k < COSINES; k++) {
+                double sampled[IO_CHANNEL_COUNT];
+                lut_tsm_sample(lut, r, work->cosines[k], dz_mm, sampled);
+                *errors++ = fabs(sampled[c] - part * work->values[k]) /
+                            fmax(work->values[k], plan->profiles[c].floor_per_mm2);
+            }
+        }
+    }
+}
+
+/* The same of the local response's depth factor, relative to the whole response, too. */
+static void local_audit(const struct audit *audit, int round, double *errors)
+{
+    const struct lut_tsm_plan *const plan = audit->plan;
+    const struct lut_tsm *const lut = plan->lut;
+    const int intervals = lut->size[0] - 1, i = round - audit->depth_count;
+    const double dz_mm = (i < intervals ? 1 : -1) * lut_tsm_local_depth_mm(lut, i % intervals + 0.5);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!plan->profiles[c].stack)
+            continue;
+        double sampled[IO_CHANNEL_COUNT];
+        const double whole = lut_tsm_means_find(plan, c, dz_mm, &audit->works[round]);
+        lut_tsm_local_depth_factor(lut, dz_mm, sampled);
+        errors[c] = fabs(sampled[c] - lut_tsm_proximity(lut, dz_mm) * whole) / whole;
+    }
+}
+
+static void round_run(void *context, int round)
+{
+    const struct audit *const audit = context;
+    uint64_t random = ((uint64_t)audit->seed << 32) + (uint64_t)round;
+    double *const errors = audit->errors + (size_t)round * audit->room;
+    if (round < audit->depth_count)
+        depth_audit(audit, round, &random, errors);
+    else
+        local_audit(audit, round, errors);
+}
+
+/* Those of the volume give the percentile; those of the local response count for the largest. */
+static struct lut_error errors_sum(const struct audit *audit, int rounds)
+{
+    const size_t of_volume = (size_t)audit->depth_count * audit->room;
+    struct lut_error error = lut_error_of(audit->errors, of_volume);
+    for (size_t i = of_volume; i < (size_t)rounds * audit->room; i++)
+        error.max = fmax(error.max, audit->errors[i]);
+    return error;
+}
+
+bool lut_tsm_plan_audit(const struct lut_tsm_plan *plan, enum lut_tsm_audit_kind kind, int depth_count,
+                        unsigned seed, int thread_count, struct lut_error *error_out, dipole_status *status)
+{
+    const int rounds = depth_count + (kind == LUT_AUDIT_BOTH ? 2 * (plan->lut->size[0] - 1) : 0);
+    struct audit audit = { .plan = plan,
+                           .kind = kind,
+                           .depth_count = depth_count,
+                           .seed = seed,
+                           .room = (size_t)plan->lut->sample_count * COSINES * IO_CHANNEL_COUNT };
+    const size_t count = (size_t)rounds * audit.room;
+    audit.errors = calloc(count, sizeof *audit.errors);
+    audit.works = calloc((size_t)rounds, sizeof *audit.works);
+    bool is_done = audit.errors && audit.works;
+    for (int i = 0; i < rounds && is_done; i++)
+        is_done = lut_tsm_work_create(plan, COSINES, &audit.works[i]);
+    if (is_done) {
+        lut_parallel_for(rounds, thread_count, round_run, &audit);
+        *error_out = errors_sum(&audit, rounds);
+    }
+    for (int i = 0; i < rounds && audit.works; i++)
+        lut_tsm_work_end(&audit.works[i]);
+    free(audit.works);
+    free(audit.errors);
+    return is_done ||
+           dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for the audit of a volume");
+}
+
+bool lut_tsm_audit(const struct lut_tsm *lut, int depth_count, unsigned seed, struct lut_error *error_out,
+                   dipole_status *status)
+{
+    struct lut_tsm copy = *lut; /* the plan derives its lengths anew */
+    struct lut_tsm_plan *plan = NULL;
+    const bool is_done = lut_tsm_plan_create(&copy, &plan, status) &&
+                         lut_tsm_plan_audit(plan, LUT_AUDIT_BOTH, depth_count, seed, 0, error_out, status);
+    lut_tsm_plan_destroy(plan);
+    return is_done;
+}
