@@ -88,7 +88,7 @@ static inline int entry_count(const char *folder)
     return count - 2; /* . and .. */
 }
 
-static inline void enter_empty_folder(void)
+static inline void enter_fresh_folder(void)
 {
     assert_int_equal(system("chmod -R u+w empty 2>/dev/null; rm -rf empty && mkdir empty"), 0);
     assert_int_equal(chdir("empty"), 0);
@@ -125,7 +125,7 @@ static inline void expect_refused(table_writer write_table, const char *path, co
 static inline void expect_bad_tables_refused(table_writer write_table)
 {
     struct io_image *image;
-    enter_empty_folder();
+    enter_fresh_folder();
     assert_true(io_image_create(6, 4, 4, &image, NULL));
     expect_refused(write_table, "x", image, 1, false, DIPOLE_BAD_VALUE,
                    "a table of 4 channels, expected 3");
@@ -148,7 +148,7 @@ static inline void expect_bad_tables_refused(table_writer write_table)
 static inline void expect_unwritable_named(table_writer write_table)
 {
     struct io_image *const image = random_table(6, 4, true, 1);
-    enter_empty_folder();
+    enter_fresh_folder();
     expect_refused(write_table, "missing/x", image, 1, false, DIPOLE_NOT_FOUND,
                    "cannot be written: No such file or directory");
     assert_int_equal(mkdir("folder", 0777), 0);
@@ -192,7 +192,7 @@ static inline int write_limited(table_writer write_table, const struct io_image 
 static inline void expect_full_disk_harmless(table_writer write_table)
 {
     struct io_image *const old = random_table(8, 4, true, 1), *const image = random_table(80, 40, true, 2);
-    enter_empty_folder();
+    enter_fresh_folder();
     size_t size, size_after;
     assert_true(write_table("x", old, 2, false, NULL));
     const int count = entry_count(".");

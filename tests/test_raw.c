@@ -153,7 +153,7 @@ static void the_sidecar_has_all_attributes(void **state)
 static void what_json_has_not_is_refused(void **state)
 {
     (void)state;
-    enter_empty_folder();
+    enter_fresh_folder();
     static const struct {
         const char *name, *text;
         double number;
@@ -196,7 +196,7 @@ static void a_sidecar_is_only_for_its_table(void **state)
 static void an_old_sidecar_does_not_match_a_new_table(void **state)
 {
     (void)state;
-    enter_empty_folder();
+    enter_fresh_folder();
     struct io_image *const old = random_table(4, 4, true, 1), *const image = random_table(4, 4, true, 2);
     assert_true(io_image_set_text(image, "dipole:text",
                                   "a long text, so that only the table fits: "
