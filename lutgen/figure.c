@@ -7,7 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { POINT_COUNT = 400, ROW_LIMIT = 8, GREEN = 1 };
+/* More texels than NODE_LIMIT would be a smear. */
+enum { POINT_COUNT = 400, NODE_LIMIT = 200, ROW_LIMIT = 8, GREEN = 1 };
 
 static bool fail_without_memory(dipole_status *status)
 {
@@ -76,12 +77,13 @@ static struct plot plot_of(const struct lut_splat *lut, const struct plot_series
     else
         snprintf(title, 192, "Splat table of %zu materials, %d texels each: green", lut->row_count,
                  lut->node_count);
-    snprintf(
-        caption, 512,
-        "As the table gives it back, interpolated between its texels (circles; the first, at r = 0, is not "
-        "shown). Stored in %s. Largest relative error %.2g, %.2g were asked.%s",
-        lut->is_half ? "half" : "float", worst, lut->epsilon,
-        lut->row_count > ROW_LIMIT ? " Only the first materials are drawn." : "");
+    snprintf(caption, 512,
+             "As the table gives it back, interpolated between its texels%s. Stored in %s. Largest "
+             "relative error "
+             "%.2g, %.2g were asked.%s",
+             lut->node_count <= NODE_LIMIT ? " (circles; the first, at r = 0, is not shown)" : "",
+             lut->is_half ? "half" : "float", worst, lut->epsilon,
+             lut->row_count > ROW_LIMIT ? " Only the first materials are drawn." : "");
     return (
         struct plot){ .title = title,
                       .caption = caption,
@@ -96,6 +98,8 @@ bool lut_splat_figure_create(const struct lut_splat *lut, char **svg_out, size_t
                              dipole_status *status)
 {
     static const char *const channel_colors[] = { PLOT_RED, PLOT_GREEN, PLOT_BLUE };
+    static const char *const row_colors[ROW_LIMIT] = { PLOT_BLUE, "#d55e00", PLOT_GREEN, "#aa4499",
+                                                       "#999933", "#332288", PLOT_RED,   PLOT_GREY };
     const bool is_one = lut->row_count == 1;
     const size_t rows = lut->row_count < ROW_LIMIT ? lut->row_count : ROW_LIMIT;
     const size_t count = is_one ? IO_CHANNEL_COUNT : rows;
@@ -109,8 +113,9 @@ bool lut_splat_figure_create(const struct lut_splat *lut, char **svg_out, size_t
         is_done = curve_init(lut, is_one ? 0 : i, is_one ? (int)i : GREEN, curve);
         snprintf(curve->label, sizeof curve->label, "%s",
                  is_one ? io_channel_names[i] : lut->rows[i].material.name);
-        series_init(curve, (size_t)lut->node_count, is_one ? channel_colors[i] : NULL,
-                    (enum plot_dash)(i % (PLOT_DOTTED + 1)), &series[2 * i]);
+        series_init(curve, lut->node_count <= NODE_LIMIT ? (size_t)lut->node_count : 0,
+                    is_one ? channel_colors[i] : row_colors[i], (enum plot_dash)(i % (PLOT_DOTTED + 1)),
+                    &series[2 * i]);
     }
     if (is_done) {
         const struct plot plot = plot_of(lut, series, 2 * count, title, caption);

@@ -1,5 +1,6 @@
 /* Splat tables as pictures: rows of texels, everything else in attributes. docs/formats.md */
 #include "lutgen/internal.h"
+#include "lutgen/self_test.h"
 
 #include <assert.h>
 #include <math.h>
@@ -102,7 +103,7 @@ static bool attributes_set(struct io_image *image, const struct lut_splat *lut, 
     lut_put_text(&writer, "dipole:unit", unit);
     lut_put_json(&writer, "dipole:row_json", rows_to_json(lut));
     put_end(&writer, lut, kind);
-    return writer.is_done;
+    return writer.is_done && lut_self_test_set_probes(image, 1);
 }
 
 bool lut_splat_to_image(const struct lut_splat *lut, enum lut_kind kind, struct io_image **image_out,
