@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 /* ((1 + x^2)^power - 1)/power, with its limit for power 0. */
 static double stretched(double x, double power)
@@ -29,15 +30,15 @@ double lut_axis_r_mm(const struct lut_axis *axis, double index)
 /* ---- the choice --------------------------------------------------------------------------------- */
 
 /*
- * Between two nodes a distance h apart in u, linear interpolation of g = R_d w^falloff errs by h^2/8
- * |g_uu|/g of R_d, so an axis is as good as the largest |g_uu|/g along it is small. With y = log r, L = log
- * R_d and m = d(log w)/dy = 2x^2/w: G = log g:  G_y = L_y + falloff m,       G_yy = L_yy + falloff m_y, m_y
- * = 4x^2/w^2 u:          u_y = w^power m/Phi,         u_yy = (power m^2 + m_y) w^power/Phi,   Phi =
- * (W^power - 1)/power g_uu/g = G_uu + G_u^2,   G_u = G_y/u_y,  G_uu = (G_yy - G_u u_yy)/u_y^2
+ * Between two nodes a distance h apart in u, linear interpolation of g = R_d w^falloff errs by
+ * h^2/8 |g_uu|/g of R_d, so an axis is as good as the largest |g_uu|/g along it is small. With y = log r,
+ * L = log R_d and m = d(log w)/dy = 2x^2/w:
+ *   G = log g:  G_y = L_y + falloff m,   G_yy = L_yy + falloff m_y,   m_y = 4x^2/w^2
+ *   u:          u_y = w^power m/Phi,     u_yy/u_y = power m + m_y/m,  Phi = (W^power - 1)/power
+ *   g_uu/g = G_uu + G_u^2 = [G_yy + G_y (G_y - u_yy/u_y)]/u_y^2
  */
 struct curve {
-    int count;
-    double log_r[AXIS_POINTS];
+    double r_mm[AXIS_POINTS];
     double slope[IO_CHANNEL_COUNT][AXIS_POINTS], bend[IO_CHANNEL_COUNT][AXIS_POINTS]; /* L_y, L_yy */
     double weight[IO_CHANNEL_COUNT][AXIS_POINTS]; /* R_d over what the error is relative to, 0 to 1       */
     double value[IO_CHANNEL_COUNT][AXIS_POINTS];  /* log R_d                                              */
@@ -47,14 +48,12 @@ static void curve_init(const struct lut_profile profiles[IO_CHANNEL_COUNT], doub
                        double r_max_mm, struct curve *curve)
 {
     const double step = log(r_max_mm / r_min_mm) / (AXIS_POINTS - 1);
-    double r_mm[AXIS_POINTS], rd[AXIS_POINTS];
-    *curve = (struct curve){ .count = AXIS_POINTS };
-    for (int j = 0; j < AXIS_POINTS; j++) {
-        curve->log_r[j] = log(r_min_mm) + j * step;
-        r_mm[j] = fmin(exp(curve->log_r[j]), r_max_mm);
-    }
+    double rd[AXIS_POINTS];
+    memset(curve, 0, sizeof *curve);
+    for (int j = 0; j < AXIS_POINTS; j++)
+        curve->r_mm[j] = fmin(r_min_mm * exp(j * step), r_max_mm);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        lut_profile_evaluate(&profiles[c], r_mm, AXIS_POINTS, rd);
+        lut_profile_evaluate(&profiles[c], curve->r_mm, AXIS_POINTS, rd);
         double *const value = curve->value[c];
         for (int j = 0; j < AXIS_POINTS; j++)
             value[j] = log(fmax(rd[j], DBL_MIN));
@@ -66,36 +65,52 @@ static void curve_init(const struct lut_profile profiles[IO_CHANNEL_COUNT], doub
     }
 }
 
-/* Largest |g_uu|/g of all channels; infinite where g would leave the range of storage. */
-static double bend_max(const struct curve *curve, const struct lut_axis *axis, double falloff,
-                       double log_range_limit)
+/* What a scale decides of the mapping at the curve's points; all powers share it. */
+struct scaled {
+    double log_w[AXIS_POINTS], m[AXIS_POINTS], m_y[AXIS_POINTS];
+};
+
+static void scaled_init(const struct curve *curve, double scale_mm, struct scaled *scaled)
 {
-    const double phi = stretched(axis->r_max_mm / axis->scale_mm, axis->power);
-    double worst = 0, least[IO_CHANNEL_COUNT], most[IO_CHANNEL_COUNT];
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        least[c] = DBL_MAX;
-        most[c] = -DBL_MAX;
+    for (int j = 1; j + 1 < AXIS_POINTS; j++) {
+        const double x = curve->r_mm[j] / scale_mm, x2 = x * x, w = 1 + x2;
+        scaled->log_w[j] = log1p(x2);
+        scaled->m[j] = 2 * x2 / w;
+        scaled->m_y[j] = 2 * scaled->m[j] / w;
     }
-    for (int j = 1; j + 1 < curve->count; j++) {
-        const double x = exp(curve->log_r[j]) / axis->scale_mm, x2 = x * x, w = 1 + x2, log_w = log1p(x2);
-        const double m = 2 * x2 / w, m_y = 2 * m / w, stretch = exp(axis->power * log_w) / phi;
-        const double u_y = stretch * m, u_yy = stretch * (axis->power * m * m + m_y);
+}
+
+/* log g of a channel falls by less than the limit of storage wherever the error is relative to R_d itself.
+ */
+static bool has_range(const struct curve *curve, const struct scaled *scaled, int channel, double falloff,
+                      double log_range_limit)
+{
+    double least = DBL_MAX, most = -DBL_MAX;
+    for (int j = 1; j + 1 < AXIS_POINTS; j++)
+        if (curve->weight[channel][j] == 1) {
+            const double log_g = curve->value[channel][j] + falloff * scaled->log_w[j];
+            least = fmin(least, log_g);
+            most = fmax(most, log_g);
+        }
+    return most - least <= log_range_limit;
+}
+
+/* Largest |g_uu|/g of all channels that scatter. */
+static double bend_max(const struct curve *curve, const struct scaled *scaled, double end, double power,
+                       double falloff)
+{
+    const double phi = stretched(end, power);
+    double worst = 0;
+    for (int j = 1; j + 1 < AXIS_POINTS; j++) {
+        const double m = scaled->m[j], m_y = scaled->m_y[j];
+        const double stretch = power == 0 ? 1 : exp(power * scaled->log_w[j]);
+        const double over_u_y = phi / (stretch * m), u_yy_over_u_y = power * m + m_y / m;
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-            if (!(curve->weight[c][j] > 0))
-                continue;
-            const double slope = (curve->slope[c][j] + falloff * m) / u_y;
-            const double bend = (curve->bend[c][j] + falloff * m_y - slope * u_yy) / (u_y * u_y);
-            worst = fmax(worst, curve->weight[c][j] * fabs(bend + slope * slope));
-            if (curve->weight[c][j] == 1) {
-                const double log_g = curve->value[c][j] + falloff * log_w;
-                least[c] = fmin(least[c], log_g);
-                most[c] = fmax(most[c], log_g);
-            }
+            const double g_y = curve->slope[c][j] + falloff * m, g_yy = curve->bend[c][j] + falloff * m_y;
+            const double bend = (g_yy + g_y * (g_y - u_yy_over_u_y)) * (over_u_y * over_u_y);
+            worst = fmax(worst, curve->weight[c][j] * fabs(bend));
         }
     }
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        if (most[c] - least[c] > log_range_limit)
-            worst = INFINITY;
     return worst;
 }
 
@@ -111,17 +126,21 @@ static struct place search(const struct curve *curve, double r_max_mm, double sh
     double scale_step = 1, power_step = 0.1;
     for (int round = 0; round < 6; round++, scale_step /= 2, power_step /= 2) {
         const struct place centre = best;
-        for (int i = -2; i <= 2; i++)
-            for (int j = -2; j <= 2; j++) {
-                struct place place = { .log_scale = centre.log_scale + i * scale_step,
-                                       .power = fmax(centre.power + j * power_step, 0) };
-                const struct lut_axis axis = { .r_max_mm = r_max_mm,
-                                               .scale_mm = shortest_mm * exp(place.log_scale),
-                                               .power = place.power };
-                place.bend = bend_max(curve, &axis, falloff, log_range_limit);
+        for (int i = -2; i <= 2; i++) {
+            struct place place = { .log_scale = centre.log_scale + i * scale_step };
+            const double scale_mm = shortest_mm * exp(place.log_scale);
+            struct scaled scaled;
+            scaled_init(curve, scale_mm, &scaled);
+            bool is_held = true;
+            for (int c = 0; c < IO_CHANNEL_COUNT && is_held; c++)
+                is_held = has_range(curve, &scaled, c, falloff, log_range_limit);
+            for (int j = -2; j <= 2 && is_held; j++) {
+                place.power = fmax(centre.power + j * power_step, 0);
+                place.bend = bend_max(curve, &scaled, r_max_mm / scale_mm, place.power, falloff);
                 if (place.bend < best.bend)
                     best = place;
             }
+        }
     }
     return best;
 }
