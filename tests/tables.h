@@ -123,7 +123,7 @@ static inline void audit_file(const json_t *files, size_t i, double epsilon)
 
 static inline char *read_whole(const char *path, size_t *size)
 {
-    char *data;
+    char *data = NULL;
     if (!io_file_read(path, (size_t)1 << 28, &data, size, NULL))
         fail_msg("%s cannot be read", path);
     return data;
