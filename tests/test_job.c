@@ -11,7 +11,16 @@ static struct tool_run run;
 static const char *const kinds[] = { "splat1d", "splat2d", "tsm" };
 static const char *const paths[] = { "out/marble.splat1d.exr", "out/materials.splat2d.exr",
                                      "out/marble.tsm.exr" };
+/* Of the smallest files that there are. */
+static const char *const epsilons[] = { "0.3", "0.3", "0.4" }, *const sizes[] = { "50", "50", "32x48x16" };
 enum { KIND_COUNT = 3 };
+
+/* Bake that kind of table of marble. */
+static json_t *bake_small(int kind)
+{
+    return BAKE(&run, MARBLE, "-o", "out", "--kind", kinds[kind], "--epsilon", epsilons[kind], "--size",
+                sizes[kind]);
+}
 
 /* Of everything in "out", by name. */
 struct folder {
@@ -210,7 +219,7 @@ static void another_request_is_baked_anew(void **state)
 static bool is_taken(int kind, const char *data, size_t size)
 {
     assert_true(io_file_write(paths[kind], data, size, NULL));
-    json_t *const files = BAKE(&run, MARBLE, "-o", "out", "--kind", kinds[kind]);
+    json_t *const files = bake_small(kind);
     const bool is_current = file_is_current(files, 0);
     json_decref(files);
     return is_current;
@@ -248,7 +257,7 @@ static void a_damaged_table_is_baked_anew(void **state)
     (void)state;
     struct rng rng = { .seed = 17 };
     for (int kind = 0; kind < KIND_COUNT; kind++) {
-        json_decref(BAKE(&run, MARBLE, "-o", "out", "--kind", kinds[kind]));
+        json_decref(bake_small(kind));
         size_t size;
         char *const good = read_whole(paths[kind], &size), *const bad = read_whole(paths[kind], &size);
         struct io_image *image;
@@ -302,7 +311,7 @@ static void a_changed_attribute_is_noticed(void **state)
 {
     (void)state;
     for (int kind = 0; kind < KIND_COUNT; kind++) {
-        json_decref(BAKE(&run, MARBLE, "-o", "out", "--kind", kinds[kind]));
+        json_decref(bake_small(kind));
         size_t size;
         char *const good = read_whole(paths[kind], &size);
         struct io_image *image;
