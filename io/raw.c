@@ -5,6 +5,7 @@
 #include "io/json.h"
 #include "io/texels.h"
 
+#include <assert.h>
 #include <inttypes.h>
 #include <limits.h>
 #include <math.h>
@@ -40,6 +41,7 @@ struct content {
 static bool hash_image(const char *path, const struct io_image *image, struct content *content,
                        dipole_status *status)
 {
+    assert(content->bytes > 0);
     uint8_t *const data = malloc(content->bytes);
     if (!data)
         return fail_without_memory(path, status);

@@ -243,9 +243,9 @@ static bool is_same_image(const struct io_image *a, const struct io_image *b)
     bool is_same = memcmp(a->pixels, b->pixels, count * sizeof *a->pixels) == 0;
     for (size_t i = 0; i < a->attribute_count && is_same; i++) {
         const struct io_attribute *const x = &a->attributes[i], *const y = io_image_find(b, x->name);
-        is_same = y && x->kind == y->kind &&
-                  (x->kind == IO_ATTRIBUTE_TEXT ? strcmp(x->text, y->text) == 0
-                                                : memcmp(x->numbers, y->numbers, sizeof x->numbers) == 0);
+        is_same = y && x->kind == y->kind && (!x->text || strcmp(x->text, y->text) == 0);
+        for (int k = 0; k < 3 && is_same; k++)
+            is_same = x->numbers[k] == y->numbers[k];
     }
     return is_same;
 }
@@ -371,8 +371,9 @@ static void files_beside_are_looked_at_too(void **state)
     static const char *const names[] = { "marble.splat1d", "materials.splat2d", "marble.tsm" };
     static const char *const ends[] = { "exr", "dds", "dds.json", "raw", "raw.json" };
     for (int kind = 0; kind < KIND_COUNT; kind++) {
-        const char *const arguments[] = { MARBLE,      "-o",       "out",         "--kind",
-                                          kinds[kind], "--format", "exr,dds,raw", NULL };
+        const char *const arguments[] = { MARBLE,         "-o",       "out",         "--kind",
+                                          kinds[kind],    "--format", "exr,dds,raw", "--epsilon",
+                                          epsilons[kind], "--size",   sizes[kind],   NULL };
         assert_int_equal(system("rm -rf out"), 0);
         json_decref(bake(&run, arguments));
         struct folder before;
