@@ -41,8 +41,8 @@ static void channel_bake(const struct lut_splat_row *row, const struct lut_profi
     }
 }
 
-static bool row_bake(struct lut_splat_row *row, const struct lut_profile profiles[IO_CHANNEL_COUNT],
-                     bool is_half, float *rgb, dipole_status *status)
+bool lut_splat_row_bake(struct lut_splat_row *row, const struct lut_profile profiles[IO_CHANNEL_COUNT],
+                        bool is_half, float *rgb, dipole_status *status)
 {
     const size_t count = (size_t)(2 * row->axis.node_count - 1);
     double *const work = malloc(2 * count * sizeof *work);
@@ -159,7 +159,7 @@ static bool draft_try(struct draft *draft, int node_count, int per_node, float *
 {
     struct lut_splat_row *const row = draft->row;
     row->axis.node_count = node_count;
-    if (!row_bake(row, draft->profiles, draft->is_half, rgb, status) ||
+    if (!lut_splat_row_bake(row, draft->profiles, draft->is_half, rgb, status) ||
         !row_audit(row, rgb, draft->profiles, per_node, LUT_SEED_BAKE, &row->error, status))
         return false;
     row->error.max *= audit_margin;

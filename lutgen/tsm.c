@@ -73,9 +73,24 @@ static void local_bake(const struct lut_tsm_plan *plan, const struct lut_tsm_wor
     }
 }
 
-static bool volume_bake(const struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
+static bool texels_create(struct lut_tsm *lut, dipole_status *status)
+{
+    const size_t count =
+        (size_t)lut->size[0] * (size_t)lut->size[1] * (size_t)lut->size[2] * IO_CHANNEL_COUNT;
+    free(lut->rgb);
+    lut->rgb = calloc(count, sizeof *lut->rgb);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        lut->scale[c] = 1;
+    return lut->rgb ||
+           dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume of %d x %d x %d",
+                       lut->size[0], lut->size[1], lut->size[2]);
+}
+
+bool lut_tsm_plan_bake(const struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
 {
     const int rows = plan->lut->size[1];
+    if (!texels_create(plan->lut, status))
+        return false;
     struct lut_tsm_work *const works = calloc((size_t)rows, sizeof *works);
     struct row_loop loop = { .plan = plan, .works = works };
     bool is_done = works != NULL;
@@ -126,16 +141,7 @@ static const double audit_margin = 1.25;
 static bool try_size(struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
 {
     struct lut_tsm *const lut = plan->lut;
-    const size_t count =
-        (size_t)lut->size[0] * (size_t)lut->size[1] * (size_t)lut->size[2] * IO_CHANNEL_COUNT;
-    free(lut->rgb);
-    lut->rgb = calloc(count, sizeof *lut->rgb);
-    if (!lut->rgb)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume of %d x %d x %d",
-                           lut->size[0], lut->size[1], lut->size[2]);
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        lut->scale[c] = 1;
-    if (!volume_bake(plan, thread_count, status))
+    if (!lut_tsm_plan_bake(plan, thread_count, status))
         return false;
     if (lut->is_half)
         volume_round(lut);

@@ -109,6 +109,12 @@ double lut_tsm_global_part(const struct lut_tsm_plan *plan, int sample, double d
 void lut_tsm_kernel_find(const struct lut_tsm_plan *plan, int channel,
                          double means[LUT_TSM_LOCAL_SIDE * LUT_TSM_LOCAL_SIDE]);
 
+/* ---- texels (tsm.c) ----------------------------------------------------------------------------- */
+
+/* Fill new texels of the volume's size[0] and size[1], in float; whatever was there is freed. */
+DIPOLE_CHECKED bool lut_tsm_plan_bake(const struct lut_tsm_plan *plan, int thread_count,
+                                      dipole_status *status);
+
 /* ---- audit (tsm_audit.c) ------------------------------------------------------------------------ */
 
 /* Which axes' points lie off the grid. */
