@@ -37,7 +37,7 @@ double lut_axis_r_mm(const struct lut_axis *axis, double index)
  */
 struct curve {
     int count;
-    double log_r[AXIS_POINTS];
+    double r_mm[AXIS_POINTS];
     double slope[IO_CHANNEL_COUNT][AXIS_POINTS], bend[IO_CHANNEL_COUNT][AXIS_POINTS]; /* L_y, L_yy */
     double weight[IO_CHANNEL_COUNT][AXIS_POINTS]; /* R_d over what the error is relative to, 0 to 1       */
     double value[IO_CHANNEL_COUNT][AXIS_POINTS];  /* log R_d                                              */
@@ -47,14 +47,12 @@ static void curve_init(const struct lut_profile profiles[IO_CHANNEL_COUNT], doub
                        double r_max_mm, struct curve *curve)
 {
     const double step = log(r_max_mm / r_min_mm) / (AXIS_POINTS - 1);
-    double r_mm[AXIS_POINTS], rd[AXIS_POINTS];
+    double rd[AXIS_POINTS];
     *curve = (struct curve){ .count = AXIS_POINTS };
-    for (int j = 0; j < AXIS_POINTS; j++) {
-        curve->log_r[j] = log(r_min_mm) + j * step;
-        r_mm[j] = fmin(exp(curve->log_r[j]), r_max_mm);
-    }
+    for (int j = 0; j < AXIS_POINTS; j++)
+        curve->r_mm[j] = fmin(r_min_mm * exp(j * step), r_max_mm);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        lut_profile_evaluate(&profiles[c], r_mm, AXIS_POINTS, rd);
+        lut_profile_evaluate(&profiles[c], curve->r_mm, AXIS_POINTS, rd);
         double *const value = curve->value[c];
         for (int j = 0; j < AXIS_POINTS; j++)
             value[j] = log(fmax(rd[j], DBL_MIN));
@@ -66,18 +64,24 @@ static void curve_init(const struct lut_profile profiles[IO_CHANNEL_COUNT], doub
     }
 }
 
-/* Largest |g_uu|/g of all channels; infinite where g would leave the range of storage. */
+/*
+ * Largest |g_uu|/g of all channels; infinite where g would leave the range of storage, or where it is at
+ * least limit. *at_worst is the point of the last axis that was too bad: it is looked at first, and most
+ * axes end there.
+ */
 static double bend_max(const struct curve *curve, const struct lut_axis *axis, double falloff,
-                       double log_range_limit)
+                       double log_range_limit, double limit, int *at_worst)
 {
     const double phi = stretched(axis->r_max_mm / axis->scale_mm, axis->power);
+    const int first = *at_worst, points = curve->count - 2;
     double worst = 0, least[IO_CHANNEL_COUNT], most[IO_CHANNEL_COUNT];
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         least[c] = DBL_MAX;
         most[c] = -DBL_MAX;
     }
-    for (int j = 1; j + 1 < curve->count; j++) {
-        const double x = exp(curve->log_r[j]) / axis->scale_mm, x2 = x * x, w = 1 + x2, log_w = log1p(x2);
+    for (int i = 0; i < points; i++) {
+        const int j = 1 + (first + i) % points;
+        const double x = curve->r_mm[j] / axis->scale_mm, x2 = x * x, w = 1 + x2, log_w = log1p(x2);
         const double m = 2 * x2 / w, m_y = 2 * m / w, stretch = exp(axis->power * log_w) / phi;
         const double u_y = stretch * m, u_yy = stretch * (axis->power * m * m + m_y);
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
@@ -91,6 +95,10 @@ static double bend_max(const struct curve *curve, const struct lut_axis *axis, d
                 least[c] = fmin(least[c], log_g);
                 most[c] = fmax(most[c], log_g);
             }
+        }
+        if (worst >= limit) {
+            *at_worst = j - 1;
+            return INFINITY;
         }
     }
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
@@ -109,6 +117,7 @@ static struct place search(const struct curve *curve, double r_max_mm, double sh
 {
     struct place best = { .log_scale = 0.5, .power = 0.2, .bend = INFINITY };
     double scale_step = 1, power_step = 0.1;
+    int at_worst = 0;
     for (int round = 0; round < 6; round++, scale_step /= 2, power_step /= 2) {
         const struct place centre = best;
         for (int i = -2; i <= 2; i++)
@@ -118,7 +127,7 @@ static struct place search(const struct curve *curve, double r_max_mm, double sh
                 const struct lut_axis axis = { .r_max_mm = r_max_mm,
                                                .scale_mm = shortest_mm * exp(place.log_scale),
                                                .power = place.power };
-                place.bend = bend_max(curve, &axis, falloff, log_range_limit);
+                place.bend = bend_max(curve, &axis, falloff, log_range_limit, best.bend, &at_worst);
                 if (place.bend < best.bend)
                     best = place;
             }
