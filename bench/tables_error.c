@@ -124,9 +124,9 @@ void bench_volume_errors(const struct bench *bench)
 
 /* ---- energy ---------------------------------------------------------------------------------------- */
 
-/* What leaves a surface across the light, evenly lit, dz above the point: the sum over the volume, the
- * local response with it, and the truth. */
-static double sum_error(const struct bench_volume *volume, int channel, double dz_mm)
+/* What a point sends out under a surface across the light that is evenly lit, dz above it: the sum over the
+ * volume and the local response. */
+static double sum_of(const struct bench_volume *volume, int channel, double dz_mm)
 {
     const struct lut_tsm *const lut = &volume->lut;
     double sum = 0, rgb[IO_CHANNEL_COUNT], factor[IO_CHANNEL_COUNT];
@@ -143,19 +143,29 @@ static double sum_error(const struct bench_volume *volume, int channel, double d
                              i / LUT_TSM_LOCAL_SIDE - LUT_TSM_LOCAL_SIDE / 2, rgb);
         sum += cell_mm * cell_mm * rgb[channel] * factor[channel];
     }
-    return sum / dipole_sources_within(&volume->plan->sources[channel], -dz_mm, INFINITY) - 1;
+    return sum;
 }
 
-/* Largest sum_error to `reach` on either side, at depths between the nodes too. */
-static double worst_to(const struct bench_volume *volume, int channel, double reach_mm)
+/* Largest errors of the sum: at dz = 0, at any depth in units of the sum at 0, and relative to the truth
+ * where that is more than a hundredth of the sum at 0. */
+struct sum_errors {
+    double flat, absolute, relative;
+};
+
+static void errors_add(const struct bench_volume *volume, int channel, struct sum_errors *errors)
 {
-    enum { DEPTHS = 1000 };
-    double worst = 0;
+    enum { DEPTHS = 2000 };
+    const dipole_sources *const sources = &volume->plan->sources[channel];
+    const double total = dipole_sources_within(sources, 0, INFINITY);
+    errors->flat = fmax(errors->flat, fabs(sum_of(volume, channel, 0) / total - 1));
     for (int i = -DEPTHS; i <= DEPTHS; i++) {
-        const double error = fabs(sum_error(volume, channel, reach_mm * i / DEPTHS));
-        worst = fmax(worst, error);
+        const double dz_mm = volume->lut.depth_max_mm * i / DEPTHS;
+        const double exact = dipole_sources_within(sources, -dz_mm, INFINITY);
+        const double error = fabs(sum_of(volume, channel, dz_mm) - exact);
+        errors->absolute = fmax(errors->absolute, error / total);
+        if (exact > 0.01 * total)
+            errors->relative = fmax(errors->relative, error / exact);
     }
-    return worst;
 }
 
 /* Part of the light that falls beyond the last ring, at dz = 0. */
@@ -182,22 +192,22 @@ static double folded(const struct bench_volume *volume, int channel)
 void bench_energy(const struct bench *bench)
 {
     static const int size[3] = { 64, 64, 32 };
-    printf("| | a, mm | reach, mm | folded into the last ring | error of the sum at dz = 0 | to 2a | to "
-           "the volume's end "
-           "|\n|---|---|---|---|---|---|---|\n");
+    printf("| | a, mm | r_max, mm | folded into the last ring | error of the sum at dz = 0 | at any dz, of "
+           "the sum at 0 | "
+           "relative, where 1 %% of that is left |\n|---|---|---|---|---|---|---|\n");
     for (int i = 0; i < BENCH_MATERIAL_COUNT; i++) {
         const struct io_material material = bench_material(bench, bench_material_names[i]);
         struct bench_volume volume;
-        double beyond = 0, flat = 0, near = 0, far = 0;
+        struct sum_errors errors = { 0 };
+        double beyond = 0;
         bench_volume_begin(&material, size, true, &volume);
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
             beyond = fmax(beyond, folded(&volume, c));
-            flat = fmax(flat, fabs(sum_error(&volume, c, 0)));
-            near = fmax(near, worst_to(&volume, c, 2 * volume.lut.inner_mm));
-            far = fmax(far, worst_to(&volume, c, volume.lut.depth_max_mm));
+            errors_add(&volume, c, &errors);
         }
-        printf("| %s | %.2f | %.1f | %.2f %% | %.1g | %.1g | %.1g |\n", bench_material_names[i],
-               volume.lut.inner_mm, volume.lut.depth_max_mm, 100 * beyond, flat, near, far);
+        printf("| %s | %.2f | %.1f | %.1f %% | %.3f %% | %.1f %% | %.1f %% |\n", bench_material_names[i],
+               volume.lut.inner_mm, volume.lut.depth_max_mm, 100 * beyond, 100 * errors.flat,
+               100 * errors.absolute, 100 * errors.relative);
         bench_volume_end(&volume);
     }
 }

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { POINT_COUNT = 601, GREEN = 1 };
+enum { POINT_COUNT = 601, MARK_COUNT = 61, GREEN = 1 };
 
 #define PI 3.14159265358979323846
 
@@ -121,8 +121,19 @@ static void depth_fill(const struct bench_volume *volume, double reach_mm, struc
 static void curves_plot(const struct bench *bench, const char *name, const char *title,
                         const char *subtitle, const char *x_title, const struct curves *curves)
 {
+    double x[MARK_COUNT], exact[MARK_COUNT];
+    for (int i = 0; i < MARK_COUNT; i++) {
+        x[i] = curves->x[i * ((POINT_COUNT - 1) / (MARK_COUNT - 1))];
+        exact[i] = curves->exact[i * ((POINT_COUNT - 1) / (MARK_COUNT - 1))];
+    }
     const struct plot_series series[] = {
-        { .label = "exact", .count = POINT_COUNT, .x = curves->x, .y = curves->exact, .color = "#bbbbbb" },
+        { .kind = PLOT_POINTS,
+          .label = "exact",
+          .count = MARK_COUNT,
+          .x = x,
+          .y = exact,
+          .color = PLOT_GREY,
+          .is_hollow = true },
         { .label = "local + global",
           .count = POINT_COUNT,
           .x = curves->x,
@@ -142,14 +153,16 @@ static void curves_plot(const struct bench *bench, const char *name, const char 
           .color = PLOT_RED,
           .dash = PLOT_DASH_DOTTED },
     };
-    const struct plot plot = { .height_px = 520,
-                               .title = title,
-                               .subtitle = subtitle,
-                               .x = { .title = x_title },
-                               .y = { .title = "of what an evenly lit slab sends out" },
-                               .series = series,
-                               .series_count = sizeof series / sizeof *series,
-                               .has_legend = true };
+    const struct plot plot = {
+        .height_px = 520,
+        .title = title,
+        .subtitle = subtitle,
+        .x = { .title = x_title, .min = curves->x[0], .max = curves->x[POINT_COUNT - 1] },
+        .y = { .title = "of what an evenly lit slab sends out" },
+        .series = series,
+        .series_count = sizeof series / sizeof *series,
+        .has_legend = true
+    };
     bench_plot(bench, name, &plot);
 }
 

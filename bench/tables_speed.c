@@ -3,6 +3,7 @@
 #include "bench/tables.h"
 #include "cli/cli.h"
 #include "io/file.h"
+#include "io/raw.h"
 #include "lutgen/parallel.h"
 
 #include <math.h>
@@ -17,35 +18,27 @@ static const int usual_size[3] = { 64, 64, 32 };
 
 /* ---- floors ---------------------------------------------------------------------------------------- */
 
-/* One chunk: `pairs` times two exponentials for each value. */
-struct exponentials {
-    const double *r_mm;
-    int pairs;
-};
-
 static void chunk_run(void *context, int chunk)
 {
-    const struct exponentials *const e = context;
+    const double *const r_mm = context;
     static _Thread_local double values[CHUNK];
     static volatile double sink;
     (void)chunk;
-    for (int i = 0; i < e->pairs; i++) {
-        bare_exp(e->r_mm, CHUNK, values);
-        sink = values[CHUNK - 1];
-    }
+    bare_exp(r_mm, CHUNK, values);
+    sink = values[CHUNK - 1];
     (void)sink;
 }
 
-static double exponentials_ms(double value_count, size_t source_count, int thread_count)
+/* Of pairs of exponentials. */
+static double exponentials_ms(double pair_count, int thread_count)
 {
     static double r_mm[CHUNK];
     for (int i = 0; i < CHUNK; i++)
         r_mm[i] = 20.0 * i / CHUNK;
-    struct exponentials e = { .r_mm = r_mm, .pairs = (int)(source_count + 1) / 2 };
-    const int chunks = (int)ceil(value_count / CHUNK);
+    const int chunks = (int)ceil(pair_count / CHUNK);
     const double start_s = cli_now_s();
-    lut_parallel_for(chunks, thread_count, chunk_run, &e);
-    return 1e3 * (cli_now_s() - start_s) * value_count / ((double)chunks * CHUNK);
+    lut_parallel_for(chunks, thread_count, chunk_run, r_mm);
+    return 1e3 * (cli_now_s() - start_s) * pair_count / ((double)chunks * CHUNK);
 }
 
 /* As many bytes of fresh memory as a volume has, each row by one turn of the loop. */
@@ -75,20 +68,14 @@ static double memory_ms(const int size[3], int thread_count)
     return ms;
 }
 
-/* Values in the slices of the samples, or only in those that differ. */
-static double value_count(const struct bench_volume *volume, bool is_distinct)
-{
-    const int slices = is_distinct ? volume->plan->class_count : volume->lut.sample_count;
-    return (double)volume->lut.size[0] * volume->lut.size[1] * slices * IO_CHANNEL_COUNT;
-}
-
+/* One for each source and value in the slices of the samples, or in those that differ only. */
 static double volume_exponentials_ms(const struct bench_volume *volume, bool is_distinct, int thread_count)
 {
-    double ms = 0;
+    const int slices = is_distinct ? volume->plan->class_count : volume->lut.sample_count;
+    double pairs = 0;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        ms += exponentials_ms(value_count(volume, is_distinct) / IO_CHANNEL_COUNT,
-                              volume->plan->sources[c].count, thread_count);
-    return ms;
+        pairs += 0.5 * (double)volume->plan->sources[c].count;
+    return exponentials_ms(pairs * volume->lut.size[0] * volume->lut.size[1] * slices, thread_count);
 }
 
 /* ---- steps of a volume ----------------------------------------------------------------------------- */
@@ -104,6 +91,8 @@ enum step {
     PICTURE,
     FILE_WRITE,
     EXR_WRITE,
+    RAW_FLOOR,
+    RAW_WRITE,
     READ_AUDIT,
     STEP_COUNT
 };
@@ -117,9 +106,11 @@ static const char *const step_names[STEP_COUNT] = {
     "audit",
     "`lut_tsm_bake`: the three above",
     "picture: copy, attributes, hash of the texels",
-    "*floor: a file of as many bytes, with fsync*",
+    "*floor: a file of as many bytes as the EXR file, with fsync*",
     "EXR file: ZIP, write, fsync",
-    "read back, check and audit",
+    "*floor: a file of all texels, with fsync*",
+    "raw file and its sidecar, each with fsync",
+    "read the EXR file back, check and audit it",
 };
 
 /* Whatever a step needs of those before it. */
@@ -227,6 +218,18 @@ static double step_ms(struct run *run, enum step step, int thread_count)
         bench_check(io_file_write(bench_path(run->bench, "floor.bin"), run->file, run->file_size, &status),
                     &status);
         break;
+    case RAW_FLOOR:
+        bench_check(io_file_write(bench_path(run->bench, "floor.bin"), run->volume.lut.rgb,
+                                  (size_t)usual_size[0] * (size_t)usual_size[1] * (size_t)usual_size[2] *
+                                      IO_CHANNEL_COUNT * sizeof(float),
+                                  &status),
+                    &status);
+        break;
+    case RAW_WRITE:
+        bench_check(
+            io_raw_write(bench_path(run->bench, "speed.raw"), run->image, usual_size[2], false, &status),
+            &status);
+        break;
     case EXR_WRITE:
         bench_check(io_exr_write(bench_path(run->bench, "speed.exr"), run->image, false, &status), &status);
         break;
@@ -254,24 +257,29 @@ static void steps_measure(struct run *run, const bool has_step[STEP_COUNT], doub
 
 static void print_steps(const struct bench *bench)
 {
-    static const bool has_step[STEP_COUNT] = { true, true, true, true, true, true,
-                                               true, true, true, true, true };
+    bool has_step[STEP_COUNT];
     const struct io_material marble = bench_material(bench, "marble");
     struct run run;
     double ms[STEP_COUNT][2];
+    for (int step = 0; step < STEP_COUNT; step++)
+        has_step[step] = true;
     run_begin(bench, &marble, &run);
     steps_measure(&run, has_step, ms);
     const double whole = ms[BAKE][1] + ms[PICTURE][1] + ms[EXR_WRITE][1] + ms[READ_AUDIT][1];
     printf("| marble, 64 × 64 × 32, float | 1 thread, ms | 2 threads, ms |\n|---|---|---|\n");
     for (int step = 0; step < STEP_COUNT; step++)
         printf("| %s | %.2f | %.2f |\n", step_names[step], ms[step][0], ms[step][1]);
-    printf("\nExponentials and memory are %.2f ms, filling takes %.1f times as long with one thread and "
-           "%.1f times with "
-           "two; the file is %.1f times its floor. All that `lutgen` does for a volume, with two threads, "
-           "takes "
-           "%.0f ms.\n",
-           ms[EXPONENTIALS][0] + ms[MEMORY][0], ms[FILL][0] / (ms[EXPONENTIALS][0] + ms[MEMORY][0]),
-           ms[FILL][1] / (ms[EXPONENTIALS][1] + ms[MEMORY][1]), ms[EXR_WRITE][0] / ms[FILE_WRITE][0],
+    printf("\nFilling takes %.1f times its floor, exponentials and memory, with one thread and %.1f times "
+           "with two. "
+           "Filling and the raw file take %.1f times the floor of both; filling and the EXR file %.1f "
+           "times, and "
+           "nearly all of that is ZIP. All that `lutgen` does for this volume, read back and audited, "
+           "takes %.0f ms "
+           "with two threads.\n",
+           ms[FILL][0] / (ms[EXPONENTIALS][0] + ms[MEMORY][0]),
+           ms[FILL][1] / (ms[EXPONENTIALS][1] + ms[MEMORY][1]),
+           (ms[FILL][0] + ms[RAW_WRITE][0]) / (ms[EXPONENTIALS][0] + ms[MEMORY][0] + ms[RAW_FLOOR][0]),
+           (ms[FILL][0] + ms[EXR_WRITE][0]) / (ms[EXPONENTIALS][0] + ms[MEMORY][0] + ms[FILE_WRITE][0]),
            whole);
     run_end(&run);
 }
@@ -315,7 +323,17 @@ static void print_models(const struct bench *bench)
 
 /* ---- splat tables ---------------------------------------------------------------------------------- */
 
-enum splat_step { S_EXPONENTIALS = 0, S_PROFILES, S_AXIS, S_FILL, S_BAKE, S_FLOOR, S_WRITE, S_COUNT };
+enum splat_step {
+    S_EXPONENTIALS = 0,
+    S_VALUES,
+    S_PROFILES,
+    S_AXIS,
+    S_FILL,
+    S_BAKE,
+    S_FLOOR,
+    S_WRITE,
+    S_COUNT
+};
 
 /* A row that is filled again and again, and the table that it belongs to. */
 struct splat_run {
@@ -324,6 +342,7 @@ struct splat_run {
     struct lut_splat *lut;
     struct lut_profile profiles[IO_CHANNEL_COUNT];
     struct io_image *image;
+    double *r_mm, *values; /* of all nodes and middles */
     float *rgb;
     char *file;
     size_t file_size;
@@ -351,9 +370,14 @@ static double splat_step_ms(const struct splat_run *run, enum splat_step step)
     struct lut_splat_row row = run->lut->rows[0];
     dipole_status status;
     if (step == S_EXPONENTIALS)
-        return exponentials_ms((2 * run->lut->node_count - 1) * IO_CHANNEL_COUNT, 2, 1);
+        return exponentials_ms((2 * run->lut->node_count - 1) * IO_CHANNEL_COUNT, 1);
     const double start_s = cli_now_s();
     switch (step) {
+    case S_VALUES:
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            lut_profile_evaluate(&run->profiles[c], run->r_mm, 2 * (size_t)run->lut->node_count - 1,
+                                 run->values);
+        break;
     case S_PROFILES:
         profiles_once(run);
         break;
@@ -393,17 +417,26 @@ static void print_splat(const struct bench *bench, const char *label, const stru
     bench_check(
         io_file_read(bench_path(bench, "speed.exr"), (size_t)1 << 32, &run.file, &run.file_size, &status),
         &status);
-    run.rgb = malloc((size_t)run.lut->node_count * IO_CHANNEL_COUNT * sizeof *run.rgb);
-    for (int round = 0; round < ROUND_COUNT && run.rgb; round++)
+    const size_t nodes = (size_t)run.lut->node_count;
+    run.rgb = malloc(nodes * IO_CHANNEL_COUNT * sizeof *run.rgb);
+    run.r_mm = malloc(4 * nodes * sizeof *run.r_mm);
+    if (!run.rgb || !run.r_mm)
+        exit(EXIT_FAILED);
+    run.values = run.r_mm + 2 * nodes;
+    for (size_t i = 0; i < 2 * nodes - 1; i++)
+        run.r_mm[i] = lut_axis_r_mm(&run.lut->rows[0].axis, 0.5 * (double)i);
+    for (int round = 0; round < ROUND_COUNT; round++)
         for (int step = 0; step < S_COUNT; step++)
             times[step][round] = splat_step_ms(&run, (enum splat_step)step);
     for (int step = 0; step < S_COUNT; step++)
         ms[step] = bench_median(times[step], ROUND_COUNT);
-    printf("| %s | %d | %.4f | %.4f | %.1f | %.3f | %.3f | %.2f | %.2f | %.2f |\n", label,
-           run.lut->node_count, ms[S_EXPONENTIALS], ms[S_FILL], ms[S_FILL] / ms[S_EXPONENTIALS],
-           ms[S_PROFILES], ms[S_AXIS], ms[S_BAKE], ms[S_FLOOR], ms[S_WRITE]);
+    printf("| %s | %d | %.1f | %.1f | %.1f | %.0f | %.0f | %.2f | %.2f | %.2f | %.2f |\n", label,
+           run.lut->node_count, 1e3 * ms[S_EXPONENTIALS], 1e3 * ms[S_VALUES], 1e3 * ms[S_FILL],
+           1e3 * ms[S_PROFILES], 1e3 * ms[S_AXIS], ms[S_BAKE], ms[S_FLOOR], ms[S_WRITE],
+           (ms[S_FILL] + ms[S_WRITE]) / (ms[S_VALUES] + ms[S_FLOOR]));
     fflush(stdout);
     free(run.rgb);
+    free(run.r_mm);
     free(run.file);
     io_image_destroy(run.image);
     lut_splat_destroy(run.lut);
@@ -413,11 +446,11 @@ static void print_splat(const struct bench *bench, const char *label, const stru
 static void print_splats(const struct bench *bench)
 {
     struct io_material material = bench_material(bench, "marble");
-    printf(
-        "\n| splat1d, ε = 0.001, one thread | texels | floor: exponentials, ms | fill, ms | in units of "
-        "the floor | "
-        "reach, ms | axis, ms | `lut_splat_bake` in all, ms | floor: file with fsync, ms | EXR file, ms |\n"
-        "|---|---|---|---|---|---|---|---|---|---|\n");
+    printf("\n| splat1d, ε = 0.001, one thread | texels | *two bare exponentials for each value, µs* | "
+           "*bare profile, µs* "
+           "| fill, µs | reach, µs | axis, µs | `lut_splat_bake`, ms | *floor: file with fsync, ms* | EXR "
+           "file, ms | fill and "
+           "file over profile and floor |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
     print_splat(bench, "marble, dipole", &material);
     material.model = DIPOLE_MODEL_BEAM;
     print_splat(bench, "marble, beam", &material);
@@ -438,6 +471,19 @@ void bench_speed(const struct bench *bench)
 
 enum { SIZE_COUNT = 5, LINE_COUNT = 4 };
 
+/* Filled as often as makes a million texels, so that the clock can tell. */
+static double fill_ms(struct bench_volume *volume, int thread_count)
+{
+    const int texels = volume->lut.size[0] * volume->lut.size[1] * volume->lut.size[2];
+    const int times = texels < 1 << 20 ? (1 << 20) / texels : 1;
+    const double start_s = cli_now_s();
+    for (int i = 0; i < times; i++) {
+        dipole_status status;
+        bench_check(lut_tsm_plan_bake(volume->plan, thread_count, &status), &status);
+    }
+    return 1e3 * (cli_now_s() - start_s) / times;
+}
+
 /* Milliseconds of: filling with one thread and with two, plan, fill and audit with two, and with the file.
  */
 static void size_round(const struct bench *bench, const struct io_material *material, int side,
@@ -449,15 +495,12 @@ static void size_round(const struct bench *bench, const struct io_material *mate
     struct io_image *image;
     dipole_status status;
     bench_volume_begin(material, size, false, &volume);
-    double start_s = cli_now_s();
-    bench_check(lut_tsm_plan_bake(volume.plan, 1, &status), &status);
-    ms[0] = 1e3 * (cli_now_s() - start_s);
+    ms[0] = fill_ms(&volume, 1);
+    ms[1] = fill_ms(&volume, 2);
     bench_volume_end(&volume);
-    start_s = cli_now_s();
+    const double start_s = cli_now_s();
     bench_volume_begin(material, size, false, &volume);
-    const double fill_s = cli_now_s();
     bench_check(lut_tsm_plan_bake(volume.plan, 2, &status), &status);
-    ms[1] = 1e3 * (cli_now_s() - fill_s);
     bench_check(
         lut_tsm_plan_audit(volume.plan, LUT_AUDIT_BOTH, 4 * side, LUT_SEED_BAKE, 2, &error, &status),
         &status);
@@ -513,16 +556,19 @@ void bench_sizes(const struct bench *bench)
                lut_pattern_cells(sides[i], cells), ms[0][i], 1e6 * ms[0][i] / texels[i], ms[1][i], ms[2][i],
                ms[3][i]);
     }
-    double ratio = 0; /* the line through the origin, in the mean of logarithms */
-    for (int i = 0; i < SIZE_COUNT; i++)
-        ratio += log(ms[0][i] / texels[i]) / SIZE_COUNT;
+    double ratio = 0; /* the line through the origin, in the mean of logarithms, from 32³ on */
+    for (int i = 1; i < SIZE_COUNT; i++)
+        ratio += log(ms[0][i] / texels[i]) / (SIZE_COUNT - 1);
     for (int i = 0; i < SIZE_COUNT; i++)
         through[i] = exp(ratio) * texels[i];
-    printf("\nTime goes with the number of texels to the power of");
+    printf("\nFrom 32³ on time goes with the number of texels to the power of");
     for (int k = 0; k < LINE_COUNT; k++)
-        printf(" %.2f (%s)%s", slope_of(texels, ms[k], SIZE_COUNT), names[k],
-               k + 1 < LINE_COUNT ? "," : "");
-    printf(", and filling takes %.2f ns a texel.\n", 1e6 * exp(ratio));
+        printf(" %.2f (%s)%s", slope_of(texels + 1, ms[k] + 1, SIZE_COUNT - 1), names[k],
+               k + 1 < LINE_COUNT ? "," : ".");
+    printf(" The line through the origin is %.2f ns a texel with one thread; what each row of a volume "
+           "needs whatever its "
+           "size makes 16³ take longer, and so does starting a thread.\n",
+           1e6 * exp(ratio));
 
     struct plot_series series[2 * LINE_COUNT + 1];
     for (int k = 0; k < LINE_COUNT; k++) {
@@ -536,7 +582,7 @@ void bench_sizes(const struct bench *bench)
             .kind = PLOT_POINTS, .count = SIZE_COUNT, .x = texels, .y = ms[k], .color = colors[k]
         };
     }
-    series[2 * LINE_COUNT] = (struct plot_series){ .label = "proportional to texels",
+    series[2 * LINE_COUNT] = (struct plot_series){ .label = "in proportion to texels",
                                                    .count = SIZE_COUNT,
                                                    .x = texels,
                                                    .y = through,
@@ -545,7 +591,7 @@ void bench_sizes(const struct bench *bench)
     const struct plot plot = { .title = "Time to bake a volume against its size",
                                .subtitle =
                                    "Marble; volumes of 16³, 32³, 64³, 128³ and 256³ texels, RGB, float.",
-                               .x = { .title = "texels", .scale = PLOT_LOG },
+                               .x = { .title = "texels", .scale = PLOT_LOG, .min = 2e3, .max = 4e7 },
                                .y = { .title = "time, ms", .scale = PLOT_LOG },
                                .series = series,
                                .series_count = COUNT(series),
