@@ -281,9 +281,27 @@ static int channel_index(const struct io_image *image, const char *name)
     return c;
 }
 
-static exr_result_t write_chunk(exr_context_t context, const struct io_image *image, int row, bool is_half,
-                                bool is_first, uint8_t *rows, exr_encode_pipeline_t *pipeline)
+/* The library's compressor. */
+struct compression {
+    exr_result_t (*run)(exr_encode_pipeline_t *pipeline);
+};
+
+/* A chunk whose size compression does not change is read as one that is not compressed, yet up to
+ * version 3.4.7 the library writes it compressed (OpenEXR issue 2306). */
+static exr_result_t compress(exr_encode_pipeline_t *pipeline)
 {
+    const struct compression *compression = pipeline->encoding_user_data;
+    const exr_result_t result = compression->run(pipeline);
+    if (result == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes)
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    return result;
+}
+
+static exr_result_t write_chunk(exr_context_t context, const struct io_image *image, int row, bool is_half,
+                                struct compression *compression, uint8_t *rows,
+                                exr_encode_pipeline_t *pipeline)
+{
+    const bool is_first = row == 0;
     const int16_t value_size = is_half ? 2 : 4;
     exr_chunk_info_t chunk;
     exr_result_t result = exr_write_scanline_chunk_info(context, 0, row, &chunk);
@@ -304,8 +322,12 @@ static exr_result_t write_chunk(exr_context_t context, const struct io_image *im
         channel->user_line_stride = value_size * image->width_px;
         channel->encode_from_ptr = plane;
     }
-    if (is_first)
+    if (is_first) {
         result = exr_encoding_choose_default_routines(context, 0, pipeline);
+        compression->run = pipeline->compress_fn;
+        pipeline->compress_fn = compress;
+        pipeline->encoding_user_data = compression;
+    }
     return result == EXR_ERR_SUCCESS ? exr_encoding_run(context, 0, pipeline) : result;
 }
 
@@ -318,9 +340,10 @@ static exr_result_t write_chunks(exr_context_t context, const struct io_image *i
     uint8_t *rows = malloc((size_t)rows_per_chunk * (size_t)image->width_px * (size_t)image->channel_count *
                            MAX_VALUE_SIZE);
     exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    struct compression compression;
     exr_result_t result = rows ? EXR_ERR_SUCCESS : EXR_ERR_OUT_OF_MEMORY;
     for (int row = 0; row < image->height_px && result == EXR_ERR_SUCCESS; row += rows_per_chunk)
-        result = write_chunk(context, image, row, is_half, row == 0, rows, &pipeline);
+        result = write_chunk(context, image, row, is_half, &compression, rows, &pipeline);
     exr_encoding_destroy(context, &pipeline);
     free(rows);
     return result;

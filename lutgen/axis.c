@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 /* ((1 + x^2)^power - 1)/power, with its limit for power 0. */
 static double stretched(double x, double power)
@@ -29,14 +30,14 @@ double lut_axis_r_mm(const struct lut_axis *axis, double index)
 /* ---- the choice --------------------------------------------------------------------------------- */
 
 /*
- * Between two nodes a distance h apart in u, linear interpolation of g = R_d w^falloff errs by h^2/8
- * |g_uu|/g of R_d, so an axis is as good as the largest |g_uu|/g along it is small. With y = log r, L = log
- * R_d and m = d(log w)/dy = 2x^2/w: G = log g:  G_y = L_y + falloff m,       G_yy = L_yy + falloff m_y, m_y
- * = 4x^2/w^2 u:          u_y = w^power m/Phi,         u_yy = (power m^2 + m_y) w^power/Phi,   Phi =
- * (W^power - 1)/power g_uu/g = G_uu + G_u^2,   G_u = G_y/u_y,  G_uu = (G_yy - G_u u_yy)/u_y^2
+ * Between two nodes a distance h apart in u, linear interpolation of g = R_d w^falloff errs by
+ * h^2/8 |g_uu|/g of R_d, so an axis is as good as the largest |g_uu|/g along it is small. With y = log r,
+ * L = log R_d and m = d(log w)/dy = 2x^2/w:
+ *   G = log g:  G_y = L_y + falloff m,   G_yy = L_yy + falloff m_y,   m_y = 4x^2/w^2
+ *   u:          u_y = w^power m/Phi,     u_yy/u_y = power m + m_y/m,  Phi = (W^power - 1)/power
+ *   g_uu/g = G_uu + G_u^2 = [G_yy + G_y (G_y - u_yy/u_y)]/u_y^2
  */
 struct curve {
-    int count;
     double r_mm[AXIS_POINTS];
     double slope[IO_CHANNEL_COUNT][AXIS_POINTS], bend[IO_CHANNEL_COUNT][AXIS_POINTS]; /* L_y, L_yy */
     double weight[IO_CHANNEL_COUNT][AXIS_POINTS]; /* R_d over what the error is relative to, 0 to 1       */
@@ -48,7 +49,7 @@ static void curve_init(const struct lut_profile profiles[IO_CHANNEL_COUNT], doub
 {
     const double step = log(r_max_mm / r_min_mm) / (AXIS_POINTS - 1);
     double rd[AXIS_POINTS];
-    *curve = (struct curve){ .count = AXIS_POINTS };
+    memset(curve, 0, sizeof *curve);
     for (int j = 0; j < AXIS_POINTS; j++)
         curve->r_mm[j] = fmin(r_min_mm * exp(j * step), r_max_mm);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
@@ -64,46 +65,52 @@ static void curve_init(const struct lut_profile profiles[IO_CHANNEL_COUNT], doub
     }
 }
 
-/*
- * Largest |g_uu|/g of all channels; infinite where g would leave the range of storage, or where it is at
- * least limit. *at_worst is the point of the last axis that was too bad: it is looked at first, and most
- * axes end there.
- */
-static double bend_max(const struct curve *curve, const struct lut_axis *axis, double falloff,
-                       double log_range_limit, double limit, int *at_worst)
+/* What a scale decides of the mapping at the curve's points; all powers share it. */
+struct scaled {
+    double log_w[AXIS_POINTS], m[AXIS_POINTS], m_y[AXIS_POINTS];
+};
+
+static void scaled_init(const struct curve *curve, double scale_mm, struct scaled *scaled)
 {
-    const double phi = stretched(axis->r_max_mm / axis->scale_mm, axis->power);
-    const int first = *at_worst, points = curve->count - 2;
-    double worst = 0, least[IO_CHANNEL_COUNT], most[IO_CHANNEL_COUNT];
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        least[c] = DBL_MAX;
-        most[c] = -DBL_MAX;
+    for (int j = 1; j + 1 < AXIS_POINTS; j++) {
+        const double x = curve->r_mm[j] / scale_mm, x2 = x * x, w = 1 + x2;
+        scaled->log_w[j] = log1p(x2);
+        scaled->m[j] = 2 * x2 / w;
+        scaled->m_y[j] = 2 * scaled->m[j] / w;
     }
-    for (int i = 0; i < points; i++) {
-        const int j = 1 + (first + i) % points;
-        const double x = curve->r_mm[j] / axis->scale_mm, x2 = x * x, w = 1 + x2, log_w = log1p(x2);
-        const double m = 2 * x2 / w, m_y = 2 * m / w, stretch = exp(axis->power * log_w) / phi;
-        const double u_y = stretch * m, u_yy = stretch * (axis->power * m * m + m_y);
+}
+
+/* log g of a channel falls by less than the limit of storage wherever the error is relative to R_d itself.
+ */
+static bool has_range(const struct curve *curve, const struct scaled *scaled, int channel, double falloff,
+                      double log_range_limit)
+{
+    double least = DBL_MAX, most = -DBL_MAX;
+    for (int j = 1; j + 1 < AXIS_POINTS; j++)
+        if (curve->weight[channel][j] == 1) {
+            const double log_g = curve->value[channel][j] + falloff * scaled->log_w[j];
+            least = fmin(least, log_g);
+            most = fmax(most, log_g);
+        }
+    return most - least <= log_range_limit;
+}
+
+/* Largest |g_uu|/g of all channels that scatter. */
+static double bend_max(const struct curve *curve, const struct scaled *scaled, double end, double power,
+                       double falloff)
+{
+    const double phi = stretched(end, power);
+    double worst = 0;
+    for (int j = 1; j + 1 < AXIS_POINTS; j++) {
+        const double m = scaled->m[j], m_y = scaled->m_y[j];
+        const double stretch = power == 0 ? 1 : exp(power * scaled->log_w[j]);
+        const double over_u_y = phi / (stretch * m), u_yy_over_u_y = power * m + m_y / m;
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-            if (!(curve->weight[c][j] > 0))
-                continue;
-            const double slope = (curve->slope[c][j] + falloff * m) / u_y;
-            const double bend = (curve->bend[c][j] + falloff * m_y - slope * u_yy) / (u_y * u_y);
-            worst = fmax(worst, curve->weight[c][j] * fabs(bend + slope * slope));
-            if (curve->weight[c][j] == 1) {
-                const double log_g = curve->value[c][j] + falloff * log_w;
-                least[c] = fmin(least[c], log_g);
-                most[c] = fmax(most[c], log_g);
-            }
-        }
-        if (worst >= limit) {
-            *at_worst = j - 1;
-            return INFINITY;
+            const double g_y = curve->slope[c][j] + falloff * m, g_yy = curve->bend[c][j] + falloff * m_y;
+            const double bend = (g_yy + g_y * (g_y - u_yy_over_u_y)) * (over_u_y * over_u_y);
+            worst = fmax(worst, curve->weight[c][j] * fabs(bend));
         }
     }
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        if (most[c] - least[c] > log_range_limit)
-            worst = INFINITY;
     return worst;
 }
 
@@ -117,20 +124,23 @@ static struct place search(const struct curve *curve, double r_max_mm, double sh
 {
     struct place best = { .log_scale = 0.5, .power = 0.2, .bend = INFINITY };
     double scale_step = 1, power_step = 0.1;
-    int at_worst = 0;
     for (int round = 0; round < 6; round++, scale_step /= 2, power_step /= 2) {
         const struct place centre = best;
-        for (int i = -2; i <= 2; i++)
-            for (int j = -2; j <= 2; j++) {
-                struct place place = { .log_scale = centre.log_scale + i * scale_step,
-                                       .power = fmax(centre.power + j * power_step, 0) };
-                const struct lut_axis axis = { .r_max_mm = r_max_mm,
-                                               .scale_mm = shortest_mm * exp(place.log_scale),
-                                               .power = place.power };
-                place.bend = bend_max(curve, &axis, falloff, log_range_limit, best.bend, &at_worst);
+        for (int i = -2; i <= 2; i++) {
+            struct place place = { .log_scale = centre.log_scale + i * scale_step };
+            const double scale_mm = shortest_mm * exp(place.log_scale);
+            struct scaled scaled;
+            scaled_init(curve, scale_mm, &scaled);
+            bool is_held = true;
+            for (int c = 0; c < IO_CHANNEL_COUNT && is_held; c++)
+                is_held = has_range(curve, &scaled, c, falloff, log_range_limit);
+            for (int j = -2; j <= 2 && is_held; j++) {
+                place.power = fmax(centre.power + j * power_step, 0);
+                place.bend = bend_max(curve, &scaled, r_max_mm / scale_mm, place.power, falloff);
                 if (place.bend < best.bend)
                     best = place;
             }
+        }
     }
     return best;
 }

@@ -81,6 +81,8 @@ static bool exr_is_current(struct lut_job *job, const char *hash)
                             table_from_image(job, image, path, &table, NULL);
     if (is_current) {
         job->error = table_error(&table);
+        job->width = image->width_px;
+        job->height = image->height_px;
         job->depth = table.tsm ? table.tsm->size[2] : 1;
         job->image = image;
         image = NULL;
@@ -90,8 +92,9 @@ static bool exr_is_current(struct lut_job *job, const char *hash)
     return is_current;
 }
 
-/* The sidecar's inputs are those, and its bytes' hash that of the file. */
-static bool sidecar_is_current(const struct lut_job *job, enum lut_format format, const char *hash)
+/* The sidecar's inputs are those, and its bytes' hash is that of the file; size and error stand in it, too.
+ */
+static bool sidecar_is_current(struct lut_job *job, enum lut_format format, const char *hash)
 {
     char path[sizeof job->stem + 16], beside[sizeof path + 8], content[17] = "", input[17] = "";
     lut_job_path(job, format, path, sizeof path);
@@ -103,9 +106,16 @@ static bool sidecar_is_current(const struct lut_job *job, enum lut_format format
     if (is_current) {
         const struct io_json root = io_json_root(document);
         const struct io_json attributes = io_json_member(&root, "attributes");
-        is_current = io_json_get_text(&root, "content_hash", content, sizeof content, NULL) &&
-                     io_json_get_text(&attributes, "dipole:input_hash", input, sizeof input, NULL) &&
-                     strcmp(input, hash) == 0 && io_file_read(path, (size_t)1 << 32, &data, &size, NULL);
+        is_current =
+            io_json_get_text(&root, "content_hash", content, sizeof content, NULL) &&
+            io_json_get_integer(&root, "width", 1, IO_IMAGE_SIDE_LIMIT, &job->width, NULL) &&
+            io_json_get_integer(&root, "height", 1, IO_IMAGE_SIDE_LIMIT, &job->height, NULL) &&
+            io_json_get_integer(&root, "depth", 1, IO_IMAGE_SIDE_LIMIT, &job->depth, NULL) &&
+            io_json_get_text(&attributes, "dipole:input_hash", input, sizeof input, NULL) &&
+            io_json_get_number(&attributes, "dipole:max_relative_error", 0, 1, &job->error.max, NULL) &&
+            io_json_get_number(&attributes, "dipole:p99_relative_error", 0, 1, &job->error.p99, NULL) &&
+            strcmp(input, hash) == 0 && io_file_read(path, (size_t)1 << 32, &data, &size, NULL);
+        job->width *= job->depth;
     }
     if (is_current) {
         uint64_t found = LUT_HASH_START;
@@ -117,12 +127,11 @@ static bool sidecar_is_current(const struct lut_job *job, enum lut_format format
     return is_current;
 }
 
-/* Only an EXR file can be read back as a table; without one the others are made anew, which costs a bake.
- */
 void lut_job_find_current(struct lut_job *job)
 {
     const struct lut_hash hash = lut_request_hash(&job->request);
-    job->is_current = (job->formats >> LUT_EXR & 1U) != 0;
+    /* only an EXR file is read back as a table, which a plot needs */
+    job->is_current = (job->formats >> LUT_EXR & 1U) || !job->is_plotted;
     for (int i = LUT_FORMAT_COUNT - 1; i >= 0 && job->is_current; i--)
         if (job->formats >> i & 1U)
             job->is_current = i == LUT_EXR ? exr_is_current(job, hash.text)
@@ -154,8 +163,11 @@ static bool bake(struct lut_job *job, dipole_status *status)
         job->depth = 1;
         is_done = is_done && lut_splat_to_image(table.splat, job->request.kind, &job->image, status);
     }
-    if (is_done)
+    if (is_done) {
         job->error = table_error(&table);
+        job->width = job->image->width_px;
+        job->height = job->image->height_px;
+    }
     table_end(&table);
     return is_done;
 }

@@ -16,28 +16,27 @@ struct lut_job {
     int thread_count;
 
     /* After lut_job_find_current or lut_job_bake: */
-    bool is_current; /* the files were there, made of the same inputs, and whole */
-    struct io_image *image;
-    int depth; /* slices side by side in the image */
+    bool is_current;          /* the files were there, made of the same inputs, and whole */
+    struct io_image *image;   /* NULL where the files were there without an EXR file among them */
+    int width, height, depth; /* texels of the picture; depth: of its slices, side by side      */
     struct lut_error error;
     double bake_ms;
 };
 
 /* Whether all files of the job are there, were baked from the same request by this version, and hold what
- * they say; the picture is then read from the first format that keeps it. */
+ * they say. */
 void lut_job_find_current(struct lut_job *job);
 
 /* Bake in memory. Fails with the material's file, or as lut_splat_bake and lut_tsm_bake do. */
 DIPOLE_CHECKED bool lut_job_bake(struct lut_job *job, dipole_status *status);
 
-/* Write all files; an EXR file is read back and audited before it gets its name.
- */
+/* Write all files; an EXR file is read back and audited before it gets its name. */
 DIPOLE_CHECKED bool lut_job_write(struct lut_job *job, dipole_status *status);
 
 /* Write DIR/NAME.KIND.svg: curves, or the contact sheet of a volume. */
 DIPOLE_CHECKED bool lut_job_plot(const struct lut_job *job, dipole_status *status);
 
-/* Path of the job's first file, and bytes of all. */
+/* Path of the job's file in a format; the first of its formats. */
 void lut_job_path(const struct lut_job *job, enum lut_format format, char *out, size_t size);
 enum lut_format lut_job_first_format(const struct lut_job *job);
 

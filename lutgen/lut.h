@@ -137,11 +137,13 @@ enum { LUT_TSM_SAMPLE_LIMIT = 256, LUT_TSM_LOCAL_SIDE = 7, LUT_TSM_SIDE_MIN = 8,
 
 /*
  * The response of a point to a unit of flux per mm^2 of the light's plane in the cell of a sample (T32), in
- * 1/mm^2: what its power per mm^2 is, after multiplication by the sample's area. With D = x_out - x_in, N
- * the normal where the light enters, dz how much deeper x_out lies along the light: S  cosine of N and D,
- * node i of size[0] at -1 + 2i/(size[0] - 1) T  dz: node i of size[1] at depth_scale sinh((2i/(size[1] - 1)
- * - 1) asinh(depth_max/depth_scale)) R  the sample Cells nearest to the point, five within a square of
- * inner_mm, leave to the local response what lies about as deep as the point: see lut_tsm_proximity.
+ * 1/mm^2: times the sample's area it is what leaves per mm^2. With D = x_out - x_in, N the normal where the
+ * light enters, dz how much deeper x_out lies along the light:
+ *   S  cosine of N and D; node i of size[0] at -1 + 2i/(size[0] - 1)
+ *   T  dz; node i of size[1] at depth_scale sinh(v asinh(depth_max/depth_scale)), v = 2i/(size[1] - 1) - 1
+ *   R  the sample
+ * The five cells nearest to the point, a square of inner_mm, leave to the local response what lies about as
+ * deep as the point: see lut_tsm_proximity.
  */
 struct lut_tsm {
     struct io_material material;
@@ -176,8 +178,9 @@ void lut_tsm_sample(const struct lut_tsm *lut, int sample, double cosine, double
 
 /*
  * The local response: 7 x 7 cells of inner_mm/7, indices from -3 to 3, in 1/mm^2, times a factor of their
- * depth, which has size[0] nodes at |dz| = local_depth_scale sinh(i/(size[0] - 1)
- * asinh(inner/local_depth_scale)). Power per mm^2 is flux per mm^2 times the cell's area times both.
+ * depth, which has size[0] nodes at
+ *   |dz| = local_depth_scale sinh(i/(size[0] - 1) asinh(inner/local_depth_scale)).
+ * Power per mm^2 is flux per mm^2 times the cell's area times both.
  */
 void lut_tsm_local_kernel(const struct lut_tsm *lut, int i, int j, double rgb_out[IO_CHANNEL_COUNT]);
 void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double rgb_out[IO_CHANNEL_COUNT]);

@@ -47,16 +47,22 @@ static bool size_parse(struct options *options, dipole_status *status)
 {
     int size[3], end = 0;
     const char *const text = options->size_text;
+    const bool has_volume = (options->kinds >> LUT_TSM & 1U) != 0, has_splat = (options->kinds & 3U) != 0;
     if (!text)
         return true;
     if (sscanf(text, "%5dx%5dx%5d%n", &size[0], &size[1], &size[2], &end) == 3 && text[end] == '\0') {
         memcpy(options->volume, size, sizeof size);
-        return true;
+        return has_volume ||
+               dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "--size is \"%.100s\", that of a volume, but --kind has no tsm", text);
     }
     end = 0;
     if (sscanf(text, "%5d%n", &size[0], &end) == 1 && text[end] == '\0') {
         options->node_count = size[0];
-        return true;
+        return has_splat ||
+               dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "--size is \"%.100s\", that of a splat table, but --kind is tsm: expected SxTxR",
+                           text);
     }
     return dipole_fail(
         status, DIPOLE_BAD_VALUE, NULL,
@@ -158,7 +164,7 @@ static bool batch_run(const struct cli_tool *tool, const struct options *options
 /* A number of texels, or [width, rows], or [S, T, R]. */
 static json_t *size_to_json(const struct lut_job *job)
 {
-    const int width = job->image->width_px, height = job->image->height_px;
+    const int width = job->width, height = job->height;
     switch (job->request.kind) {
     case LUT_SPLAT2D:
         return json_pack("[ii]", width, height);
@@ -206,7 +212,7 @@ static bool print_json(const struct batch *batch, dipole_status *status)
 
 static void size_to_text(const struct lut_job *job, char out[48])
 {
-    const int width = job->image->width_px, height = job->image->height_px;
+    const int width = job->width, height = job->height;
     if (job->request.kind == LUT_TSM)
         snprintf(out, 48, "%dx%dx%d", width / job->depth, height, job->depth);
     else if (job->request.kind == LUT_SPLAT2D)

@@ -1,6 +1,6 @@
 // Splat tables of lutgen: R_d(r), the power that leaves per mm^2 for one unit of power that entered at a
-// distance r. GLSL 3.30 or later, any stage. The texture: half or float, linear filtering, clamped to its
-// edge, no mip maps, not sRGB.
+// distance r. GLSL 3.30 or later, any stage. The texture: half or float, no mip maps, not sRGB. Its filter is
+// not used: the weights of graphics processors have 8 bits, which is too few for tables of 0.1 %.
 
 // A row's attributes, without their "dipole:".
 struct dipole_splat {
@@ -34,7 +34,10 @@ vec3 dipole_splat_rd_per_mm2(sampler2D texels, dipole_splat table, float r_mm)
         return vec3(0.0);
     float x = r_mm / table.scale_mm;
     float w = 1.0 + x * x;
-    vec2 size = vec2(textureSize(texels, 0));
-    vec2 texel = vec2(dipole_splat_u(table, w) * (size.x - 1.0), float(table.row)) + 0.5;
-    return textureLod(texels, texel / size, 0.0).rgb * table.scale * pow(w, -table.falloff);
+    int last = textureSize(texels, 0).x - 2;
+    float index = dipole_splat_u(table, w) * float(last + 1);
+    int i = min(int(index), last);
+    vec3 low = texelFetch(texels, ivec2(i, table.row), 0).rgb;
+    vec3 high = texelFetch(texels, ivec2(i + 1, table.row), 0).rgb;
+    return mix(low, high, index - float(i)) * table.scale * pow(w, -table.falloff);
 }
