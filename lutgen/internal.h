@@ -58,6 +58,13 @@ enum { AXIS_POINTS = 128 };
 double lut_axis_find(const struct lut_profile profiles[IO_CHANNEL_COUNT], double log_range_limit,
                      struct lut_axis *axis_out, double *falloff_out);
 
+/* ---- rows of splat tables (splat.c) -------------------------------------------------------------- */
+
+/* Texels of a row whose axis and falloff are set; sets its scale and core. */
+DIPOLE_CHECKED bool lut_splat_row_bake(struct lut_splat_row *row,
+                                       const struct lut_profile profiles[IO_CHANNEL_COUNT], bool is_half,
+                                       float *rgb, dipole_status *status);
+
 /* ---- attributes of files (attributes.c) ---------------------------------------------------------- */
 
 /* Attributes that are being set: the first failure ends the rest. */
