@@ -53,14 +53,12 @@ void lut_put_material(struct lut_writer *writer, const struct io_material *mater
 
 void lut_put_end(struct lut_writer *writer, const struct lut_request *request)
 {
-    const struct io_image *const image = writer->image;
-    const size_t count = (size_t)image->width_px * (size_t)image->height_px * IO_CHANNEL_COUNT;
     lut_put_text(writer, "dipole:storage", request->is_half ? "half" : "float");
     const double asked[] = { request->size[0], request->size[1], request->size[2] };
     lut_put_numbers(writer, "dipole:size_asked", asked);
     lut_put_text(writer, "dipole:version", dipole_version());
-    lut_put_text(writer, "dipole:content_hash", lut_content_hash(image->pixels, count).text);
     lut_put_text(writer, "dipole:input_hash", lut_request_hash(request).text);
+    lut_put_text(writer, "dipole:content_hash", lut_content_hash(writer->image).text);
 }
 
 /* ---- reading ------------------------------------------------------------------------------------ */

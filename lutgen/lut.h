@@ -111,8 +111,8 @@ DIPOLE_CHECKED bool lut_splat_audit(const struct lut_splat *lut, size_t row, int
 DIPOLE_CHECKED bool lut_splat_to_image(const struct lut_splat *lut, enum lut_kind kind,
                                        struct io_image **image_out, dipole_status *status);
 
-/* Back from a picture. Fails with DIPOLE_BAD_VALUE, naming the attribute that is missing, out of range or
- * at odds with the others or with the texels; path is for messages. */
+/* Back from a picture. Fails with DIPOLE_BAD_VALUE or DIPOLE_BAD_SYNTAX, naming the attribute that is
+ * missing, out of range or at odds with the others or with the texels; path is for messages. */
 DIPOLE_CHECKED bool lut_splat_from_image(const struct io_image *image, const char *path,
                                          struct lut_splat **lut_out, dipole_status *status);
 
