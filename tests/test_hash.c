@@ -89,7 +89,7 @@ static void materials_have_a_hash_of_what_decides(void **state)
                 fail_msg("changes %zu and %zu have the same hash", i, k);
 }
 
-/* Oracle: the definition. */
+/* Oracle: the definition; the materials' texts stand in the file. */
 static void requests_have_a_hash_of_what_decides(void **state)
 {
     (void)state;
@@ -100,7 +100,11 @@ static void requests_have_a_hash_of_what_decides(void **state)
     const struct lut_request request = {
         .kind = LUT_SPLAT2D, .materials = materials, .material_count = 2, .epsilon = 0.01
     };
-    struct lut_request others[10];
+    struct io_material sourced[2] = { materials[0], materials[1] };
+    snprintf(sourced[1].source, sizeof sourced[1].source, "elsewhere");
+    struct io_material labelled[2] = { materials[0], materials[1] };
+    snprintf(labelled[0].layer_names[0], sizeof labelled[0].layer_names[0], "all of it");
+    struct lut_request others[12];
     for (size_t i = 0; i < COUNT(others); i++)
         others[i] = request;
     others[1].kind = LUT_TSM;
@@ -112,6 +116,8 @@ static void requests_have_a_hash_of_what_decides(void **state)
     others[7].material_count = 1;
     others[8].materials = swapped;
     others[9].materials = named;
+    others[10].materials = sourced;
+    others[11].materials = labelled;
     for (size_t i = 0; i < COUNT(others); i++)
         for (size_t k = 0; k < i; k++)
             if (strcmp(lut_request_hash(&others[i]).text, lut_request_hash(&others[k]).text) == 0)
