@@ -494,6 +494,8 @@ static void size_round(const struct bench *bench, const struct io_material *mate
     struct lut_error error;
     struct io_image *image;
     dipole_status status;
+    char name[32]; /* to replace a larger file takes the time to delete it */
+    snprintf(name, sizeof name, "speed_%d.exr", side);
     bench_volume_begin(material, size, false, &volume);
     ms[0] = fill_ms(&volume, 1);
     ms[1] = fill_ms(&volume, 2);
@@ -506,7 +508,7 @@ static void size_round(const struct bench *bench, const struct io_material *mate
         &status);
     ms[2] = 1e3 * (cli_now_s() - start_s);
     bench_check(lut_tsm_to_image(&volume.lut, &image, &status) &&
-                    io_exr_write(bench_path(bench, "speed.exr"), image, false, &status),
+                    io_exr_write(bench_path(bench, name), image, false, &status),
                 &status);
     ms[3] = 1e3 * (cli_now_s() - start_s);
     io_image_destroy(image);
