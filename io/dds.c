@@ -3,7 +3,6 @@
 #include "io/dds.h"
 
 #include "io/file.h"
-#include "io/texels.h"
 
 #include <stdlib.h>
 
@@ -32,8 +31,9 @@ enum {
     WORD_COUNT = IO_DDS_HEADER_BYTES / 4
 };
 
-static void put_header(const struct io_texels *texels, bool is_half, uint8_t out[IO_DDS_HEADER_BYTES])
+static void put_header(const struct io_texels *texels, uint8_t out[IO_DDS_HEADER_BYTES])
 {
+    const bool is_half = texels->value_size == 2;
     const bool is_volume = texels->depth > 1;
     const uint32_t words[WORD_COUNT] = {
         [0] = 'D' | 'D' << 8 | 'S' << 16 | ' ' << 24,
@@ -63,6 +63,12 @@ static void put_header(const struct io_texels *texels, bool is_half, uint8_t out
         out = io_bytes_put(out, words[i], 4);
 }
 
+void io_dds_pack(const struct io_texels *texels, const struct io_image *image, uint8_t *out)
+{
+    put_header(texels, out);
+    io_texels_pack(texels, image, out + IO_DDS_HEADER_BYTES);
+}
+
 bool io_dds_write(const char *path, const struct io_image *image, int depth, bool is_half,
                   dipole_status *status)
 {
@@ -75,8 +81,7 @@ bool io_dds_write(const char *path, const struct io_image *image, int depth, boo
         const dipole_place place = { .source = path };
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, &place, "no memory for %zu bytes", size);
     }
-    put_header(&texels, is_half, data);
-    io_texels_pack(&texels, image, data + IO_DDS_HEADER_BYTES);
+    io_dds_pack(&texels, image, data);
     const bool done = io_file_write(path, data, size, status);
     free(data);
     return done;

@@ -2,7 +2,7 @@
 #ifndef IO_DDS_H
 #define IO_DDS_H
 
-#include "io/exr.h"
+#include "io/texels.h"
 
 /* Bytes before the texels: magic number, header, header of Direct3D 10. */
 enum { IO_DDS_HEADER_BYTES = 4 + 124 + 20 };
@@ -17,5 +17,8 @@ enum { IO_DDS_HEADER_BYTES = 4 + 124 + 20 };
  */
 DIPOLE_CHECKED bool io_dds_write(const char *path, const struct io_image *image, int depth, bool is_half,
                                  dipole_status *status);
+
+/* The IO_DDS_HEADER_BYTES + texels->bytes of such a file; texels of 4 channels. */
+void io_dds_pack(const struct io_texels *texels, const struct io_image *image, uint8_t *out);
 
 #endif

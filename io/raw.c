@@ -5,6 +5,7 @@
 #include "io/json.h"
 #include "io/texels.h"
 
+#include <assert.h>
 #include <inttypes.h>
 #include <limits.h>
 #include <math.h>
@@ -20,22 +21,40 @@ static bool fail_without_memory(const char *path, dipole_status *status)
 
 /* ---- the sidecar ---------------------------------------------------------------------------------- */
 
-static uint64_t fnv1a_64(const char *data, size_t size)
+static uint64_t fnv1a_64(const void *bytes, size_t size)
 {
+    const unsigned char *const data = bytes;
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
     for (size_t i = 0; i < size; i++)
-        hash = (hash ^ (unsigned char)data[i]) * UINT64_C(0x100000001b3);
+        hash = (hash ^ data[i]) * UINT64_C(0x100000001b3);
     return hash;
 }
 
-/* Layout of the file at path, raw or DDS as its size says, and what is in it. */
+/* Layout of the file at path, raw or DDS as its size says, and hashes of what is in it and of what the
+ * image's own file has: others may write there at the same time. */
 struct content {
     struct io_texels texels;
     size_t header_bytes, bytes;
-    uint64_t hash;
+    uint64_t hash, hash_there;
 };
 
-static bool read_content(const char *path, const struct io_image *image, int depth, bool is_half,
+static bool hash_image(const char *path, const struct io_image *image, struct content *content,
+                       dipole_status *status)
+{
+    assert(content->bytes > 0);
+    uint8_t *const data = malloc(content->bytes);
+    if (!data)
+        return fail_without_memory(path, status);
+    if (content->header_bytes > 0)
+        io_dds_pack(&content->texels, image, data);
+    else
+        io_texels_pack(&content->texels, image, data);
+    content->hash = fnv1a_64(data, content->bytes);
+    free(data);
+    return true;
+}
+
+static bool content_find(const char *path, const struct io_image *image, int depth, bool is_half,
                          struct content *content, dipole_status *status)
 {
     struct io_texels raw, dds;
@@ -44,16 +63,17 @@ static bool read_content(const char *path, const struct io_image *image, int dep
         !io_texels_init(&dds, path, image, depth, 4, is_half, status) ||
         !io_file_read(path, IO_DDS_HEADER_BYTES + dds.bytes, &data, &content->bytes, status))
         return false;
-    content->hash = fnv1a_64(data, content->bytes);
+    content->hash_there = fnv1a_64(data, content->bytes);
     free(data);
     const bool is_raw = content->bytes == raw.bytes;
     content->texels = is_raw ? raw : dds;
     content->header_bytes = is_raw ? 0 : IO_DDS_HEADER_BYTES;
     const dipole_place place = { .source = path };
-    return content->bytes == content->header_bytes + content->texels.bytes ||
-           dipole_fail(status, DIPOLE_BAD_VALUE, &place,
-                       "has %zu bytes, expected %zu (raw) or %zu (DDS) for this table", content->bytes,
-                       raw.bytes, IO_DDS_HEADER_BYTES + dds.bytes);
+    if (content->bytes != content->header_bytes + content->texels.bytes)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, &place,
+                           "has %zu bytes, expected %zu (raw) or %zu (DDS) for this table", content->bytes,
+                           raw.bytes, IO_DDS_HEADER_BYTES + dds.bytes);
+    return hash_image(path, image, content, status);
 }
 
 static bool is_json(const char *name)
@@ -125,25 +145,46 @@ static char *describe(const struct content *content, json_t *attributes)
     return text;
 }
 
+/* The sidecar's path and, to be freed, its text. */
+static bool sidecar_make(const char *path, const struct io_image *image, const struct content *content,
+                         char out[PATH_MAX], char **text_out, dipole_status *status)
+{
+    const dipole_place place = { .source = path };
+    *text_out = NULL;
+    if (snprintf(out, PATH_MAX, "%s.json", path) >= PATH_MAX)
+        return dipole_fail(status, DIPOLE_IO_FAILED, &place, "has too long a name");
+    json_t *const attributes = describe_attributes(path, image, status);
+    if (!attributes)
+        return false;
+    *text_out = describe(content, attributes);
+    return *text_out || fail_without_memory(out, status);
+}
+
 bool io_sidecar_write(const char *path, const struct io_image *image, int depth, bool is_half,
                       dipole_status *status)
 {
     struct content content;
-    char sidecar_path[PATH_MAX];
-    const dipole_place place = { .source = path };
-    if (snprintf(sidecar_path, sizeof sidecar_path, "%s.json", path) >= (int)sizeof sidecar_path)
-        return dipole_fail(status, DIPOLE_IO_FAILED, &place, "has too long a name");
-    if (!read_content(path, image, depth, is_half, &content, status))
-        return false;
-    json_t *const attributes = describe_attributes(path, image, status);
-    if (!attributes)
-        return false;
-    char *const text = describe(&content, attributes);
-    if (!text)
-        return fail_without_memory(sidecar_path, status);
-    const bool done = io_file_write(sidecar_path, text, strlen(text), status);
+    char sidecar_path[PATH_MAX], *text = NULL;
+    const bool done = content_find(path, image, depth, is_half, &content, status) &&
+                      sidecar_make(path, image, &content, sidecar_path, &text, status) &&
+                      io_file_write(sidecar_path, text, strlen(text), status);
     free(text);
     return done;
+}
+
+bool io_sidecar_is_current(const char *path, const struct io_image *image, int depth, bool is_half)
+{
+    struct content content;
+    char sidecar_path[PATH_MAX], *text = NULL, *found = NULL;
+    size_t size;
+    const bool is_current = content_find(path, image, depth, is_half, &content, NULL) &&
+                            content.hash == content.hash_there &&
+                            sidecar_make(path, image, &content, sidecar_path, &text, NULL) &&
+                            io_file_read(sidecar_path, strlen(text), &found, &size, NULL) &&
+                            size == strlen(text) && memcmp(found, text, size) == 0;
+    free(found);
+    free(text);
+    return is_current;
 }
 
 /* ---- the table ------------------------------------------------------------------------------------ */

@@ -17,8 +17,9 @@ DIPOLE_CHECKED bool io_raw_write(const char *path, const struct io_image *image,
 
 /*
  * Write path.json about the file at path, which io_raw_write or io_dds_write made of the same image: layout
- * and size of its bytes, their hash (FNV-1a, 64 bit), and all attributes of the image. Numbers give back
- * the same double; a text whose attribute's name ends with _json stands there as JSON. docs/engines.md.
+ * and size of its bytes, their hash (FNV-1a, 64 bit; of the image's, whatever others have written there
+ * since), and all attributes of the image. Numbers give back the same double; a text whose attribute's name
+ * ends with _json stands there as JSON. docs/engines.md.
  *
  * Fails with DIPOLE_BAD_VALUE when the file's size is not that of the image, or an attribute is not finite,
  * not UTF-8 or not the JSON that its name promises; with DIPOLE_OUT_OF_MEMORY; or as io_file_read and
@@ -26,5 +27,9 @@ DIPOLE_CHECKED bool io_raw_write(const char *path, const struct io_image *image,
  */
 DIPOLE_CHECKED bool io_sidecar_write(const char *path, const struct io_image *image, int depth,
                                      bool is_half, dipole_status *status);
+
+/* Whether the file at path and its sidecar have the very bytes that would be written. False, too, where
+ * that cannot be found out. */
+bool io_sidecar_is_current(const char *path, const struct io_image *image, int depth, bool is_half);
 
 #endif

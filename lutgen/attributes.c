@@ -51,6 +51,22 @@ void lut_put_material(struct lut_writer *writer, const struct io_material *mater
     lut_put_number(writer, "dipole:eta", layers[0][0].medium.eta);
 }
 
+/* Of names and values: what cannot be derived again, such as a measured error, shall not be changed
+ * unnoticed. */
+static struct lut_hash attributes_hash(const struct io_image *image)
+{
+    uint64_t hash = LUT_HASH_START;
+    for (size_t i = 0; i < image->attribute_count; i++) {
+        const struct io_attribute *const attribute = &image->attributes[i];
+        lut_hash_text(&hash, attribute->name);
+        if (attribute->kind == IO_ATTRIBUTE_TEXT)
+            lut_hash_text(&hash, attribute->text);
+        for (int k = 0; attribute->kind != IO_ATTRIBUTE_TEXT && k < 3; k++)
+            lut_hash_number(&hash, attribute->numbers[k]);
+    }
+    return lut_hash_print(hash);
+}
+
 void lut_put_end(struct lut_writer *writer, const struct lut_request *request)
 {
     const struct io_image *const image = writer->image;
@@ -61,6 +77,7 @@ void lut_put_end(struct lut_writer *writer, const struct lut_request *request)
     lut_put_text(writer, "dipole:version", dipole_version());
     lut_put_text(writer, "dipole:content_hash", lut_content_hash(image->pixels, count).text);
     lut_put_text(writer, "dipole:input_hash", lut_request_hash(request).text);
+    lut_put_text(writer, "dipole:attributes_hash", attributes_hash(image).text);
 }
 
 /* ---- reading ------------------------------------------------------------------------------------ */

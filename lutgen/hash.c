@@ -58,8 +58,12 @@ struct lut_hash lut_request_hash(const struct lut_request *request)
     for (int i = 0; i < 3; i++)
         lut_hash_number(&hash, request->size[i]);
     for (size_t i = 0; i < request->material_count; i++) {
-        lut_hash_text(&hash, request->materials[i].name);
-        lut_hash_material(&hash, &request->materials[i]);
+        const struct io_material *const material = &request->materials[i];
+        lut_hash_text(&hash, material->name); /* texts stand in the attributes */
+        lut_hash_text(&hash, material->source);
+        for (size_t k = 0; k < material->layer_count; k++)
+            lut_hash_text(&hash, material->layer_names[k]);
+        lut_hash_material(&hash, material);
     }
     return lut_hash_print(hash);
 }

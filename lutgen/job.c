@@ -92,50 +92,20 @@ static bool exr_is_current(struct lut_job *job, const char *hash)
     return is_current;
 }
 
-/* The sidecar's inputs are those, and its bytes' hash is that of the file; size and error stand in it, too.
+/* Only an EXR file can be read back as a table; without one the others are made anew, which costs a bake.
  */
-static bool sidecar_is_current(struct lut_job *job, enum lut_format format, const char *hash)
-{
-    char path[sizeof job->stem + 16], beside[sizeof path + 8], content[17] = "", input[17] = "";
-    lut_job_path(job, format, path, sizeof path);
-    snprintf(beside, sizeof beside, "%s.json", path);
-    struct io_json_document *document = NULL;
-    char *data = NULL;
-    size_t size;
-    bool is_current = io_json_read(beside, &document, NULL);
-    if (is_current) {
-        const struct io_json root = io_json_root(document);
-        const struct io_json attributes = io_json_member(&root, "attributes");
-        is_current =
-            io_json_get_text(&root, "content_hash", content, sizeof content, NULL) &&
-            io_json_get_integer(&root, "width", 1, IO_IMAGE_SIDE_LIMIT, &job->width, NULL) &&
-            io_json_get_integer(&root, "height", 1, IO_IMAGE_SIDE_LIMIT, &job->height, NULL) &&
-            io_json_get_integer(&root, "depth", 1, IO_IMAGE_SIDE_LIMIT, &job->depth, NULL) &&
-            io_json_get_text(&attributes, "dipole:input_hash", input, sizeof input, NULL) &&
-            io_json_get_number(&attributes, "dipole:max_relative_error", 0, 1, &job->error.max, NULL) &&
-            io_json_get_number(&attributes, "dipole:p99_relative_error", 0, 1, &job->error.p99, NULL) &&
-            strcmp(input, hash) == 0 && io_file_read(path, (size_t)1 << 32, &data, &size, NULL);
-        job->width *= job->depth;
-    }
-    if (is_current) {
-        uint64_t found = LUT_HASH_START;
-        lut_hash_bytes(&found, data, size);
-        is_current = strcmp(lut_hash_print(found).text, content) == 0;
-    }
-    free(data);
-    io_json_destroy(document);
-    return is_current;
-}
-
 void lut_job_find_current(struct lut_job *job)
 {
     const struct lut_hash hash = lut_request_hash(&job->request);
-    /* only an EXR file is read back as a table, which a plot needs */
-    job->is_current = (job->formats >> LUT_EXR & 1U) || !job->is_plotted;
-    for (int i = LUT_FORMAT_COUNT - 1; i >= 0 && job->is_current; i--)
-        if (job->formats >> i & 1U)
-            job->is_current = i == LUT_EXR ? exr_is_current(job, hash.text)
-                                           : sidecar_is_current(job, (enum lut_format)i, hash.text);
+    job->is_current = (job->formats >> LUT_EXR & 1U) && exr_is_current(job, hash.text);
+    for (int i = LUT_EXR + 1; i < LUT_FORMAT_COUNT && job->is_current; i++) {
+        char path[sizeof job->stem + 16];
+        lut_job_path(job, (enum lut_format)i, path, sizeof path);
+        job->is_current = !(job->formats >> i & 1U) ||
+                          io_sidecar_is_current(path, job->image, job->depth, job->request.is_half);
+    }
+    if (!job->is_current)
+        lut_job_end(job);
 }
 
 /* ---- baking ------------------------------------------------------------------------------------- */

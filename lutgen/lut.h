@@ -36,7 +36,8 @@ struct lut_request {
     bool is_half;          /* texels are rounded to half; epsilon must then be above 4.9e-4 */
 };
 
-/* Of all that decides the bytes of the table: the request, the materials' names, the library's version. */
+/* Of all that decides the bytes of the table: the request, the materials with their texts, the library's
+ * version. */
 struct lut_hash lut_request_hash(const struct lut_request *request);
 
 /* Largest relative error, and the one that 99 % of random points stay below. */

@@ -102,8 +102,9 @@ static bool attributes_set(struct io_image *image, const struct lut_splat *lut, 
     lut_put_text(&writer, "dipole:axis_mapping", axis_mapping);
     lut_put_text(&writer, "dipole:unit", unit);
     lut_put_json(&writer, "dipole:row_json", rows_to_json(lut));
+    writer.is_done = writer.is_done && lut_self_test_set_probes(image, 1);
     put_end(&writer, lut, kind);
-    return writer.is_done && lut_self_test_set_probes(image, 1);
+    return writer.is_done;
 }
 
 bool lut_splat_to_image(const struct lut_splat *lut, enum lut_kind kind, struct io_image **image_out,

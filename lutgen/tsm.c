@@ -145,7 +145,7 @@ static bool try_size(struct lut_tsm_plan *plan, int thread_count, dipole_status 
         return false;
     if (lut->is_half)
         volume_round(lut);
-    if (!lut_tsm_plan_audit(plan, LUT_AUDIT_BOTH, 4 * lut->size[1], LUT_SEED_BAKE, thread_count,
+    if (!lut_tsm_plan_audit(plan, LUT_AUDIT_BOTH, 2 * (lut->size[1] - 1), LUT_SEED_BAKE, thread_count,
                             &lut->error, status))
         return false;
     lut->error.max = audit_margin * lut->error.max + lut->source_error;
@@ -158,8 +158,9 @@ static bool grow(struct lut_tsm_plan *plan, int thread_count, bool *has_grown, d
 {
     struct lut_tsm *const lut = plan->lut;
     struct lut_error by_s, by_t;
-    if (!lut_tsm_plan_audit(plan, LUT_AUDIT_S, lut->size[1], LUT_SEED_BAKE, thread_count, &by_s, status) ||
-        !lut_tsm_plan_audit(plan, LUT_AUDIT_T, lut->size[1], LUT_SEED_BAKE, thread_count, &by_t, status))
+    const int depth_count = lut->size[1] / 2; /* fewer than for the error itself will do to compare */
+    if (!lut_tsm_plan_audit(plan, LUT_AUDIT_S, depth_count, LUT_SEED_BAKE, thread_count, &by_s, status) ||
+        !lut_tsm_plan_audit(plan, LUT_AUDIT_T, depth_count, LUT_SEED_BAKE, thread_count, &by_t, status))
         return false;
     const bool can_s = lut->size_asked[0] == 0 && lut->size[0] < LUT_TSM_SIDE_MAX &&
                        2 * lut->size[0] * lut->size[2] <= IO_IMAGE_SIDE_LIMIT;

@@ -615,6 +615,73 @@ static void what_cannot_be_written_is_named(void **state)
     io_image_destroy(image);
 }
 
+/* ---- checked before it has its name ----------------------------------------------------------------- */
+
+struct watch {
+    const struct io_image *image; /* what the file must hold */
+    bool is_good;
+    int calls;
+};
+
+static bool watch_file(void *context, const char *path, dipole_status *status)
+{
+    struct watch *const watch = context;
+    struct io_image *found;
+    watch->calls++;
+    assert_string_not_equal(path, "checked.exr");
+    assert_true(io_exr_read(path, &found, NULL));
+    expect_same(found, watch->image);
+    assert_int_equal(found->attribute_count, 1);
+    assert_string_equal(found->attributes[0].text, "value");
+    io_image_destroy(found);
+    const dipole_place place = { .source = path };
+    return watch->is_good || dipole_fail(status, DIPOLE_NOT_CONVERGED, &place, "is refused");
+}
+
+/* Oracle: the picture itself, read back by the check; what it refuses leaves the old file, and no other. A
+ * picture that cannot be written is not looked at. */
+static void a_check_reads_the_picture_before_it_has_its_name(void **state)
+{
+    (void)state;
+    struct io_image *const image = random_image(40, 30, 3, 5);
+    assert_true(io_image_set_text(image, "dipole:x", "value"));
+    struct watch watch = { .image = image, .is_good = true };
+    char *plain, *checked;
+    size_t plain_size, checked_size;
+    dipole_status status = { 0 };
+    assert_true(io_exr_write("plain.exr", image, false, NULL));
+    read_bytes("plain.exr", &plain, &plain_size);
+    const int before = entry_count();
+    for (int round = 0; round < 3; round++) {
+        watch.is_good = round == 1;
+        assert_true(io_exr_write_checked("checked.exr", image, false, watch_file, &watch, &status) ==
+                    watch.is_good);
+        assert_int_equal(watch.calls, round + 1);
+        assert_int_equal(entry_count(), before + (round > 0));
+        if (!watch.is_good) {
+            assert_int_equal(status.code, DIPOLE_NOT_CONVERGED);
+            assert_string_equal(status.source, "checked.exr");
+            assert_string_equal(status.message, "is refused");
+        }
+        if (round > 0) {
+            read_bytes("checked.exr", &checked, &checked_size);
+            assert_int_equal(checked_size, plain_size);
+            assert_memory_equal(checked, plain, plain_size);
+            free(checked);
+        }
+        status = (dipole_status){ 0 };
+    }
+    assert_true(io_exr_write_checked("checked.exr", image, false, NULL, NULL, NULL));
+    image->pixels[7] = 1e5f;
+    assert_false(io_exr_write_checked("checked.exr", image, true, watch_file, &watch, NULL));
+    assert_false(io_exr_write_checked("missing/checked.exr", image, false, watch_file, &watch, NULL));
+    assert_int_equal(watch.calls, 3);
+    assert_int_equal(entry_count(), before + 1);
+    free(plain);
+    io_image_destroy(image);
+    assert_int_equal(unlink("checked.exr") | unlink("plain.exr"), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -631,6 +698,7 @@ int main(void)
         cmocka_unit_test(a_truncated_file_is_refused),
         cmocka_unit_test(damaged_files_end_in_an_image_or_a_message),
         cmocka_unit_test(what_cannot_be_written_is_named),
+        cmocka_unit_test(a_check_reads_the_picture_before_it_has_its_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

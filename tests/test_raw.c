@@ -191,6 +191,44 @@ static void a_sidecar_is_only_for_its_table(void **state)
     io_image_destroy(image);
 }
 
+/* Oracle: hashes of files. Whoever writes another table of the same size there in between finds a sidecar
+ * that is not of it. */
+static void a_sidecar_vouches_for_no_other_table(void **state)
+{
+    (void)state;
+    enter_fresh_folder();
+    for (int is_dds = 0; is_dds < 2; is_dds++) {
+        const table_writer write_table = is_dds ? io_dds_write : io_raw_write;
+        struct io_image *const mine = random_table(6, 4, true, 1), *const other =
+                                                                       random_table(6, 4, true, 2);
+        assert_true(write_table("x", mine, 3, true, NULL) && io_sidecar_write("x", mine, 3, true, NULL));
+        assert_true(io_sidecar_is_current("x", mine, 3, true));
+        assert_false(io_sidecar_is_current("x", other, 3, true));
+        assert_false(io_sidecar_is_current("x", mine, 1, true));
+        assert_false(io_sidecar_is_current("x", mine, 3, false));
+        assert_false(io_sidecar_is_current("missing", mine, 3, true));
+        json_t *const right = read_sidecar("x.json");
+        assert_true(write_table("x", other, 3, true, NULL));
+        assert_false(io_sidecar_is_current("x", mine, 3, true));
+        assert_true(io_sidecar_write("x", mine, 3, true, NULL));
+        json_t *const sidecar = read_sidecar("x.json");
+        assert_true(json_equal(sidecar, right));
+        assert_false(io_sidecar_is_current("x", mine, 3, true) ||
+                     io_sidecar_is_current("x", other, 3, true));
+        assert_true(write_table("x", mine, 3, true, NULL));
+        assert_true(io_sidecar_is_current("x", mine, 3, true));
+        assert_true(io_image_set_text(mine, "dipole:new", "text"));
+        assert_false(io_sidecar_is_current("x", mine, 3, true));
+        assert_int_equal(unlink("x.json"), 0);
+        assert_false(io_sidecar_is_current("x", mine, 3, true));
+        json_decref(sidecar);
+        json_decref(right);
+        io_image_destroy(mine);
+        io_image_destroy(other);
+    }
+    assert_int_equal(chdir(".."), 0);
+}
+
 /* Oracle: on a disk that is full after the table, the old sidecar stands beside the new table, and its hash
  * says that it is not of it. */
 static void an_old_sidecar_does_not_match_a_new_table(void **state)
@@ -254,6 +292,7 @@ int main(void)
         cmocka_unit_test(the_sidecar_has_all_attributes),
         cmocka_unit_test(what_json_has_not_is_refused),
         cmocka_unit_test(a_sidecar_is_only_for_its_table),
+        cmocka_unit_test(a_sidecar_vouches_for_no_other_table),
         cmocka_unit_test(an_old_sidecar_does_not_match_a_new_table),
         cmocka_unit_test(same_table_same_bytes),
         cmocka_unit_test(what_is_no_table_is_refused),
