@@ -226,12 +226,13 @@ void bench_partition(const struct bench *bench)
     edge_fill(&volume, 4 * volume.lut.inner_mm, &edge);
     depth_fill(&volume, 3 * volume.lut.inner_mm, &depth);
     curves_plot(bench, "tables_edge.svg", "A flat slab, lit to the left of a shadow's edge",
-                "Marble, green. What leaves, by the volume and the local response, and by integration.",
+                "Marble, green. Lines: by the volume and the local response; circles: by integration.",
                 "distance from the edge of the shadow, mm", 1.1, &edge);
-    curves_plot(bench, "tables_depth.svg", "A point below and above an evenly lit surface",
-                "Marble, green; the surface lies across the light. By the volume and the local "
-                "response; in closed form.",
-                "dz: how much deeper the point lies than the surface, mm", 1.5, &depth);
+    curves_plot(
+        bench, "tables_depth.svg", "A point below and above an evenly lit surface",
+        "Marble, green; the surface lies across the light. Lines: by the volume and the local response; "
+        "circles: in closed form.",
+        "dz: how much deeper the point lies than the surface, mm", 1.5, &depth);
     pattern_draw(bench, &volume);
     printf("Here, of what an evenly lit slab sends out, the sum errs by at most %.1g across the shadow's "
            "edge and by "

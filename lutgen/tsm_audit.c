@@ -43,7 +43,8 @@ struct audit {
 
 /* Errors of one class at one depth: points in the slices of its members by turns. */
 static double *class_audit(const struct audit *audit, const struct lut_cell_class *class, double t,
-                           double dz_mm, uint64_t *random, const struct lut_tsm_work *work, double *errors)
+                           double dz_mm, enum place place, uint64_t *random,
+                           const struct lut_tsm_work *work, double *errors)
 {
     const struct lut_tsm_plan *const plan = audit->plan;
     const struct lut_tsm *const lut = plan->lut;
