@@ -205,9 +205,7 @@ static void changed_texels_are_refused(void **state)
         float *const texel = &image->pixels[random_bits(&rng) % (uint64_t)(image->width_px * 3)],
                      was = *texel;
         *texel = nextafterf(was, i % 2 ? INFINITY : 0);
-        assert_refused(image, open_table,
-                       "attribute dipole:content_hash does not fit the rest of the file: something in it "
-                       "was changed");
+        assert_refused(image, open_table, "does not fit the rest of the file: something in it was changed");
         *texel = was;
     }
     image->pixels[3 * 5 + 1] = -1;
