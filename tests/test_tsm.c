@@ -219,7 +219,7 @@ static void local_and_global_leave_no_gap(void **state)
         lut_tsm_local_depth_factor(lut, dz_mm, factor);
         lut_tsm_local_depth_factor(lut, dz_mm + 1e-7 * lut->inner_mm, next);
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-            const double whole = lut_tsm_means_find(plan, c, dz_mm, &work);
+            const double whole = lut_tsm_inner_part(plan, c, dz_mm, &work);
             const double local = lut_tsm_proximity(lut, dz_mm) * whole;
             assert_true(fabs(factor[c] - local) <= lut->error.max * whole);
             assert_true(fabs(next[c] - factor[c]) < 1e-5);
