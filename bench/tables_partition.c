@@ -119,7 +119,8 @@ static void depth_fill(const struct bench_volume *volume, double reach_mm, struc
 /* ---- pictures --------------------------------------------------------------------------------------- */
 
 static void curves_plot(const struct bench *bench, const char *name, const char *title,
-                        const char *subtitle, const char *x_title, const struct curves *curves)
+                        const char *subtitle, const char *x_title, double y_max,
+                        const struct curves *curves)
 {
     double x[MARK_COUNT], exact[MARK_COUNT];
     for (int i = 0; i < MARK_COUNT; i++) {
@@ -157,8 +158,8 @@ static void curves_plot(const struct bench *bench, const char *name, const char 
         .height_px = 520,
         .title = title,
         .subtitle = subtitle,
-        .x = { .title = x_title, .min = curves->x[0], .max = curves->x[POINT_COUNT - 1] },
-        .y = { .title = "of what an evenly lit slab sends out" },
+        .x = { .title = x_title, .min = 1.03 * curves->x[0], .max = 1.03 * curves->x[POINT_COUNT - 1] },
+        .y = { .title = "of what an evenly lit slab sends out", .max = y_max },
         .series = series,
         .series_count = sizeof series / sizeof *series,
         .has_legend = true
@@ -225,13 +226,13 @@ void bench_partition(const struct bench *bench)
     edge_fill(&volume, 4 * volume.lut.inner_mm, &edge);
     depth_fill(&volume, 3 * volume.lut.inner_mm, &depth);
     curves_plot(bench, "tables_edge.svg", "A flat slab, lit to the left of a shadow's edge",
-                "Marble, green. What leaves, by the volume and the local response, and by integration.",
-                "distance from the edge of the shadow, mm", &edge);
+                "Marble, green. Lines: by the volume and the local response; circles: by integration.",
+                "distance from the edge of the shadow, mm", 1.1, &edge);
     curves_plot(
         bench, "tables_depth.svg", "A point below and above an evenly lit surface",
-        "Marble, green. The surface lies across the light. What arrives, by the volume and the local "
-        "response, and in closed form.",
-        "dz: how much deeper the point lies than the surface, mm", &depth);
+        "Marble, green; the surface lies across the light. Lines: by the volume and the local response; "
+        "circles: in closed form.",
+        "dz: how much deeper the point lies than the surface, mm", 1.5, &depth);
     pattern_draw(bench, &volume);
     printf("Here, of what an evenly lit slab sends out, the sum errs by at most %.1g across the shadow's "
            "edge and by "

@@ -26,8 +26,9 @@ static double weight_at(const struct lut_splat_row *row, double r_mm)
 static void channel_bake(const struct lut_profile *profile, const double *r_mm, const double *weights,
                          int last, double *values)
 {
-    lut_profile_evaluate(profile, r_mm, (size_t)(2 * last + 1), values);
-    for (int i = 0; i <= 2 * last; i++)
+    const size_t count = 2 * (size_t)last + 1;
+    lut_profile_evaluate(profile, r_mm, count, values);
+    for (size_t i = 0; i < count; i++)
         values[i] *= weights[i];
     double before = 0;
     for (int i = 0; i <= last; i++) { /* the interval after node i still has its exact ends */
