@@ -30,50 +30,31 @@ static uint64_t fnv1a_64(const void *bytes, size_t size)
     return hash;
 }
 
-/* Layout of the file at path, raw or DDS as its size says, and hashes of what is in it and of what the
- * image's own file has: others may write there at the same time. */
+/* Layout and hash of an image's own file, whatever there is on disk: others may write there, too. */
 struct content {
     struct io_texels texels;
     size_t header_bytes, bytes;
-    uint64_t hash, hash_there;
+    uint64_t hash;
 };
 
-static bool hash_image(const char *path, const struct io_image *image, struct content *content,
-                       dipole_status *status)
+static bool content_find(const char *path, const struct io_image *image, int depth, bool is_half,
+                         bool is_dds, struct content *content, dipole_status *status)
 {
+    if (!io_texels_init(&content->texels, path, image, depth, is_dds ? 4 : 3, is_half, status))
+        return false;
+    content->header_bytes = is_dds ? IO_DDS_HEADER_BYTES : 0;
+    content->bytes = content->header_bytes + content->texels.bytes;
     assert(content->bytes > 0);
     uint8_t *const data = malloc(content->bytes);
     if (!data)
         return fail_without_memory(path, status);
-    if (content->header_bytes > 0)
+    if (is_dds)
         io_dds_pack(&content->texels, image, data);
     else
         io_texels_pack(&content->texels, image, data);
     content->hash = fnv1a_64(data, content->bytes);
     free(data);
     return true;
-}
-
-static bool content_find(const char *path, const struct io_image *image, int depth, bool is_half,
-                         struct content *content, dipole_status *status)
-{
-    struct io_texels raw, dds;
-    char *data;
-    if (!io_texels_init(&raw, path, image, depth, 3, is_half, status) ||
-        !io_texels_init(&dds, path, image, depth, 4, is_half, status) ||
-        !io_file_read(path, IO_DDS_HEADER_BYTES + dds.bytes, &data, &content->bytes, status))
-        return false;
-    content->hash_there = fnv1a_64(data, content->bytes);
-    free(data);
-    const bool is_raw = content->bytes == raw.bytes;
-    content->texels = is_raw ? raw : dds;
-    content->header_bytes = is_raw ? 0 : IO_DDS_HEADER_BYTES;
-    const dipole_place place = { .source = path };
-    if (content->bytes != content->header_bytes + content->texels.bytes)
-        return dipole_fail(status, DIPOLE_BAD_VALUE, &place,
-                           "has %zu bytes, expected %zu (raw) or %zu (DDS) for this table", content->bytes,
-                           raw.bytes, IO_DDS_HEADER_BYTES + dds.bytes);
-    return hash_image(path, image, content, status);
 }
 
 static bool is_json(const char *name)
@@ -160,30 +141,55 @@ static bool sidecar_make(const char *path, const struct io_image *image, const s
     return *text_out || fail_without_memory(out, status);
 }
 
-bool io_sidecar_write(const char *path, const struct io_image *image, int depth, bool is_half,
-                      dipole_status *status)
+static bool sidecar_write(const char *path, const struct io_image *image, int depth, bool is_half,
+                          bool is_dds, dipole_status *status)
 {
     struct content content;
     char sidecar_path[PATH_MAX], *text = NULL;
-    const bool done = content_find(path, image, depth, is_half, &content, status) &&
+    const bool done = content_find(path, image, depth, is_half, is_dds, &content, status) &&
                       sidecar_make(path, image, &content, sidecar_path, &text, status) &&
                       io_file_write(sidecar_path, text, strlen(text), status);
     free(text);
     return done;
 }
 
+bool io_dds_sidecar_write(const char *path, const struct io_image *image, int depth, bool is_half,
+                          dipole_status *status)
+{
+    return sidecar_write(path, image, depth, is_half, true, status);
+}
+
+static bool has_content(const char *path, const struct content *content)
+{
+    char *data;
+    size_t size;
+    const bool is_same = io_file_read(path, content->bytes, &data, &size, NULL) && size == content->bytes &&
+                         fnv1a_64(data, size) == content->hash;
+    free(data);
+    return is_same;
+}
+
+static bool has_text(const char *path, const char *text)
+{
+    char *data;
+    size_t size;
+    const bool is_same = io_file_read(path, strlen(text), &data, &size, NULL) && strcmp(data, text) == 0;
+    free(data);
+    return is_same;
+}
+
 bool io_sidecar_is_current(const char *path, const struct io_image *image, int depth, bool is_half)
 {
-    struct content content;
-    char sidecar_path[PATH_MAX], *text = NULL, *found = NULL;
-    size_t size;
-    const bool is_current = content_find(path, image, depth, is_half, &content, NULL) &&
-                            content.hash == content.hash_there &&
-                            sidecar_make(path, image, &content, sidecar_path, &text, NULL) &&
-                            io_file_read(sidecar_path, strlen(text), &found, &size, NULL) &&
-                            size == strlen(text) && memcmp(found, text, size) == 0;
-    free(found);
-    free(text);
+    bool is_current = false;
+    for (int is_dds = 0; is_dds < 2 && !is_current; is_dds++) {
+        struct content content;
+        char sidecar_path[PATH_MAX], *text = NULL;
+        is_current = content_find(path, image, depth, is_half, is_dds, &content, NULL) &&
+                     has_content(path, &content) &&
+                     sidecar_make(path, image, &content, sidecar_path, &text, NULL) &&
+                     has_text(sidecar_path, text);
+        free(text);
+    }
     return is_current;
 }
 
@@ -201,5 +207,5 @@ bool io_raw_write(const char *path, const struct io_image *image, int depth, boo
     io_texels_pack(&texels, image, data);
     const bool done = io_file_write(path, data, texels.bytes, status);
     free(data);
-    return done && io_sidecar_write(path, image, depth, is_half, status);
+    return done && sidecar_write(path, image, depth, is_half, false, status);
 }

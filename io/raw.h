@@ -10,25 +10,26 @@
  * it goes its sidecar. Each is written atomically, the sidecar last, so that one whose content_hash is that
  * of the bytes belongs to them, wherever writing was interrupted.
  *
- * Fails as io_texels_init does, with DIPOLE_OUT_OF_MEMORY, or as io_file_write and io_sidecar_write do.
+ * Fails as io_texels_init does, with DIPOLE_OUT_OF_MEMORY, or as io_file_write and io_dds_sidecar_write do.
  */
 DIPOLE_CHECKED bool io_raw_write(const char *path, const struct io_image *image, int depth, bool is_half,
                                  dipole_status *status);
 
 /*
- * Write path.json about the file at path, which io_raw_write or io_dds_write made of the same image: layout
- * and size of its bytes, their hash (FNV-1a, 64 bit; of the image's, whatever others have written there
- * since), and all attributes of the image. Numbers give back the same double; a text whose attribute's name
- * ends with _json stands there as JSON. docs/engines.md.
+ * Write path.json, the sidecar of the file that io_dds_write makes of the image at path: layout and size of
+ * its bytes, their hash (FNV-1a, 64 bit), and all attributes of the image. Numbers give back the same
+ * double; a text whose attribute's name ends with _json stands there as JSON. docs/engines.md. The file is
+ * not looked at: when others write there at the same time, the sidecar is of this image or of theirs, never
+ * of a mixture.
  *
- * Fails with DIPOLE_BAD_VALUE when the file's size is not that of the image, or an attribute is not finite,
- * not UTF-8 or not the JSON that its name promises; with DIPOLE_OUT_OF_MEMORY; or as io_file_read and
- * io_file_write do.
+ * Fails as io_texels_init does; with DIPOLE_BAD_VALUE when an attribute is not finite, not UTF-8 or not the
+ * JSON that its name promises; with DIPOLE_OUT_OF_MEMORY; or as io_file_write does.
  */
-DIPOLE_CHECKED bool io_sidecar_write(const char *path, const struct io_image *image, int depth,
-                                     bool is_half, dipole_status *status);
+DIPOLE_CHECKED bool io_dds_sidecar_write(const char *path, const struct io_image *image, int depth,
+                                         bool is_half, dipole_status *status);
 
-/* Whether the file at path and its sidecar have the very bytes that would be written. False, too, where
+/* Whether the file at path and its sidecar have the very bytes that io_raw_write, or io_dds_write and
+ * io_dds_sidecar_write, would write. False, too, where
  * that cannot be found out. */
 bool io_sidecar_is_current(const char *path, const struct io_image *image, int depth, bool is_half);
 

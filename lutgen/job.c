@@ -210,7 +210,7 @@ static bool format_write(struct lut_job *job, enum lut_format format, dipole_sta
         return io_exr_write_checked(path, job->image, is_half, file_audit, job, status);
     case LUT_DDS:
         return io_dds_write(path, job->image, job->depth, is_half, status) &&
-               io_sidecar_write(path, job->image, job->depth, is_half, status);
+               io_dds_sidecar_write(path, job->image, job->depth, is_half, status);
     case LUT_RAW:
     case LUT_FORMAT_COUNT:
         break;

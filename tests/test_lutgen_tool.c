@@ -180,6 +180,11 @@ static void sizes_are_those_asked_for(void **state)
         run_tool(&run, "lutgen", marble, "-o", "out", "--kind", cases[i].kind, "--size", cases[i].size);
         assert_failed(&run, cases[i].exit_code, message);
     }
+    run_tool(&run, "lutgen", marble, "-o", "out", "--kind", "tsm", "--size", "64");
+    assert_failed(&run, 2,
+                  "lutgen: --size is \"64\", that of a splat table, but --kind is tsm: expected SxTxR\n");
+    run_tool(&run, "lutgen", marble, "-o", "out", "--kind", "splat1d,splat2d", "--size", "64x64x32");
+    assert_failed(&run, 2, "lutgen: --size is \"64x64x32\", that of a volume, but --kind has no tsm\n");
     assert_int_equal(count_entries("out"), -1);
 }
 

@@ -68,7 +68,7 @@ static bool write_and_read(dipole_status *status)
         status->code = DIPOLE_OUT_OF_MEMORY; /* setters have no status */
     is_done = is_done && io_exr_write("a.exr", image, true, status) &&
               io_exr_read("a.exr", &found, status) && io_dds_write("a.dds", image, 2, true, status) &&
-              io_sidecar_write("a.dds", image, 2, true, status) &&
+              io_dds_sidecar_write("a.dds", image, 2, true, status) &&
               io_raw_write("a.raw", image, 2, false, status);
     if (found) {
         assert_memory_equal(found->pixels, image->pixels, (size_t)16 * 8 * 3 * sizeof(float));
