@@ -148,7 +148,7 @@ bool lut_tsm_figure_create(const struct lut_tsm *lut, char **svg_out, size_t *si
 {
     const size_t count = (size_t)lut->sample_count, texels = (size_t)lut->size[0] * (size_t)lut->size[1];
     struct plot_tile *const tiles = calloc(count, sizeof *tiles);
-    double *const values = malloc(count * texels * sizeof *values);
+    double *const values = calloc(count * texels, sizeof *values);
     char(*const labels)[48] = calloc(count, sizeof *labels);
     char title[192], subtitle[256];
     double most = 0;
