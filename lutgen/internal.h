@@ -69,7 +69,8 @@ void lut_put_text(struct lut_writer *writer, const char *name, const char *text)
 void lut_put_number(struct lut_writer *writer, const char *name, double value);
 void lut_put_numbers(struct lut_writer *writer, const char *name, const double values[3]);
 void lut_put_json(struct lut_writer *writer, const char *name, json_t *json); /* takes json; NULL fails */
-/* What every kind ends with: storage, version, hashes of the texels, of the inputs and of all attributes. */
+/* What every kind ends with: storage, version, hashes of the texels, of the inputs and of all attributes.
+ */
 void lut_put_end(struct lut_writer *writer, const struct lut_request *request);
 /* A table's one material. */
 void lut_put_material(struct lut_writer *writer, const struct io_material *material);
