@@ -370,8 +370,10 @@ DIPOLE_API DIPOLE_CHECKED bool dipole_sources_init(const dipole_stack *stack, do
 /*
  * Power that leaves per mm^2 at out_mm for one unit that enters at in_mm through a surface with the unit
  * normal in_normal, in 1/mm^2. Over a flat surface it is the profile. Where the shape is thin or concave a
- * point can lie next to a source, and the profile would have no bound: no source is taken to be nearer than
- * its own depth. What that does to the energy is in theory.md T30.
+ * point can lie next to a source, and the profile would have no bound: nearer to a source than its own
+ * depth z its part is continued with the same value and slope, level at the source, where it is (1 + b/2)
+ * times what it is at distance z; b = (3 + x^2/(1 + x))/2, x = sigma_tr z. What that does to the energy is
+ * in theory.md T30.
  */
 DIPOLE_API double dipole_sources_between_per_mm2(const dipole_sources *sources, const double in_mm[3],
                                                  const double in_normal[3], const double out_mm[3]);

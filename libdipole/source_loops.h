@@ -9,11 +9,13 @@
 /* ---- one distance, many directions ---------------------------------------------------------------- */
 
 /*
- * Two sources at one distance D: d^2 = D^2 + z^2 + 2 z D cos, continued below z^2 as in sources.h. As in
- * row_loops.h the fast loop leaves out the second double of sigma_tr and what only extreme inputs need.
+ * Two sources at one distance D: d^2 = D^2 + z^2 + 2 z D cos, continued below z^2 as in sources.h: w (1 + b
+ * (u - u^2/2)) = w + v (inward - bend v), v = z^2 u. As in row_loops.h the fast loop leaves out the second
+ * double of sigma_tr and what only extreme inputs need.
  */
 struct source_pair {
-    double sigma_tr[2], middle[2], slope[2], floor[2], over_floor[2], steepness[2], weighted_z[2];
+    double sigma_tr[2], middle[2], slope[2], floor[2], weighted_z[2];
+    double inward[2], bend[2]; /* the parabola, times weighted_z, in v = z^2 - d^2 */
 };
 
 static struct source_pair source_pair_of(const dipole_sources *sources, size_t k, double distance_mm)
@@ -27,9 +29,9 @@ static struct source_pair source_pair_of(const dipole_sources *sources, size_t k
         pair.middle[i] = MULTIPLY_ADD(distance_mm, distance_mm, z * z);
         pair.slope[i] = 2.0 * z * distance_mm;
         pair.floor[i] = z * z;
-        pair.over_floor[i] = 1.0 / (z * z);
-        pair.steepness[i] = source_steepness(source->sigma_tr_per_mm * fabs(z));
         pair.weighted_z[i] = (is_last ? 0.5 : 1.0) / (2.0 * PI) * source->weight * fabs(z);
+        pair.inward[i] = pair.weighted_z[i] * source_steepness(source->sigma_tr_per_mm * fabs(z)) / (z * z);
+        pair.bend[i] = 0.5 * pair.inward[i] / (z * z);
     }
     return pair;
 }
@@ -53,9 +55,11 @@ static inline double source_pair_value(const struct source_pair *pair, double co
     const double a2 = a < pair->floor[0] ? pair->floor[0] : a, b2 = b < pair->floor[1] ? pair->floor[1] : b;
     const double d_a = sqrt(a2), d_b = sqrt(b2), x_a = pair->sigma_tr[0] * d_a,
                  x_b = pair->sigma_tr[1] * d_b;
-    const double u_a = (a2 - a) * pair->over_floor[0], u_b = (b2 - b) * pair->over_floor[1];
-    const double w_a = pair->weighted_z[0] * (1.0 + pair->steepness[0] * (u_a - 0.5 * u_a * u_a)),
-                 w_b = pair->weighted_z[1] * (1.0 + pair->steepness[1] * (u_b - 0.5 * u_b * u_b));
+    const double v_a = a2 - a, v_b = b2 - b;
+    const double w_a = MULTIPLY_ADD(v_a, MULTIPLY_ADD(v_a, -pair->bend[0], pair->inward[0]),
+                                    pair->weighted_z[0]),
+                 w_b = MULTIPLY_ADD(v_b, MULTIPLY_ADD(v_b, -pair->bend[1], pair->inward[1]),
+                                    pair->weighted_z[1]);
     const double e_a = decay_times_normal(MULTIPLY_ADD(w_a, x_a, w_a), x_a),
                  e_b = decay_times_normal(MULTIPLY_ADD(w_b, x_b, w_b), x_b);
     const double a3 = d_a * a2, b3 = d_b * b2;
@@ -112,11 +116,13 @@ static void profile(const dipole_sources *sources, double distance_mm, const dou
 /*
  * One source over a disc whose plane it is `rise` = height + z away from. Beyond where d = |z| its |z|
  * e^(-s d)/d is differenced by hand as in lobe.h: |z| (e^(-s d0)/d0 - e^(-s d)/d) = |z| e^(-s d0)/d [D/d0 +
- * 1 - e^(-s D)],  D = d - d0. Out to there, r^2 up to `hold2`, the parabola of sources.h is integrated over
- * r^2, with u from u0 down to u1: lobe(z) [r^2 + b ((u0 + u1)/2 - (u0^2 + u0 u1 + u1^2)/6) r^2]/2.
+ * 1 - e^(-s D)],  D = d - d0. Out to there, r^2 up to `hold2`, stands the parabola of sources.h, whose u
+ * falls from u0 on the axis by r^2/z^2. Its mean over the disc,
+ *   1 + b (u0 - u0^2/2) - b y ((1 - u0)/2 + y/6),  y = min(r^2, hold2)/z^2 <= u0,
+ * loses no digit: what is taken away is at most half of what it is taken from.
  */
 struct source_disc {
-    double sigma_tr, rise2, floor, over_floor, hold2, start, over_start, held, steepness, faded;
+    double sigma_tr, rise2, floor, over_floor, hold2, start, over_start, on_axis, outward, bend, faded;
 };
 
 static struct source_disc source_disc_of(const dipole_sources *sources, size_t k, double height_mm)
@@ -126,16 +132,19 @@ static struct source_disc source_disc_of(const dipole_sources *sources, size_t k
     const double hold2 = -height_mm * (height_mm + 2.0 * z); /* z^2 - rise^2 */
     const double above = fabs(height_mm + z), rise = above > LOBE_FAR_MM ? LOBE_FAR_MM : above,
                  start = hold2 > 0.0 ? depth : rise;
+    const double held = 0.5 * weighted_z * (s + 1.0 / depth) * exp(-s * depth) / (depth * depth);
+    const double b = source_steepness(s * depth), u0 = hold2 > 0.0 ? hold2 / (depth * depth) : 0.0;
     return (struct source_disc){
         .sigma_tr = s,
         .rise2 = rise * rise,
         .floor = depth * depth,
         .over_floor = 1.0 / (depth * depth),
-        .steepness = source_steepness(s * depth),
         .hold2 = hold2 > 0.0 ? hold2 : 0.0,
         .start = start,
         .over_start = 1.0 / start,
-        .held = 0.5 * weighted_z * (s + 1.0 / depth) * exp(-s * depth) / (depth * depth),
+        .on_axis = held * (1.0 + b * (u0 - 0.5 * u0 * u0)),
+        .outward = held * b * 0.5 * (1.0 - u0),
+        .bend = held * b / 6.0,
         .faded = weighted_z * exp(-s * start),
     };
 }
@@ -147,9 +156,8 @@ static inline double source_disc_within(const struct source_disc *disc, double r
     const double inner = r2 < disc->hold2 ? r2 : disc->hold2, outer = r2 - inner;
     const double sum = d + disc->start, over = 1.0 / (d * sum), longer = outer * (d * over);
     const double share = MULTIPLY_ADD(longer, disc->over_start, decay_deficit(disc->sigma_tr * longer));
-    const double u0 = disc->hold2 * disc->over_floor, u1 = u0 - inner * disc->over_floor;
-    const double mean = 0.5 * (u0 + u1) - (u0 * u0 + u0 * u1 + u1 * u1) / 6.0;
-    const double held = disc->held * MULTIPLY_ADD(disc->steepness, mean, 1.0);
+    const double y = inner * disc->over_floor;
+    const double held = MULTIPLY_ADD(-y, MULTIPLY_ADD(y, disc->bend, disc->outward), disc->on_axis);
     return MULTIPLY_ADD(held, inner, disc->faded * (share * (sum * over)));
 }
 

@@ -13,11 +13,12 @@
  * Nearer to a source than its own depth, which happens off a flat surface only, its lobe would have no
  * bound. There it is continued as a parabola in t = (d/z)^2 that has the same value and slope at t = 1 and
  * is level at the source: lobe(z) (1 + b (u - u^2/2)), u = 1 - t, b = -d log lobe/dt = (3 + x^2/(1 + x))/2,
- * x = sigma_tr z.
+ * x = sigma_tr z. This is b; beyond x = 1400 the lobe is 0 whatever it is multiplied by.
  */
 static inline double source_steepness(double x)
 {
-    return 0.5 * (3.0 + x * (x / (1.0 + x)));
+    const double y = x > 1400.0 ? 1400.0 : x;
+    return 0.5 * (2.0 + y + 1.0 / (1.0 + y));
 }
 
 /* |depth| (sigma_tr + 1/d) e^(-sigma_tr d)/d^2, so continued: as a lobe, at the distance that makes the

@@ -95,13 +95,18 @@ static bool has_range(const struct curve *curve, const struct scaled *scaled, in
     return most - least <= log_range_limit;
 }
 
-/* Largest |g_uu|/g of all channels that scatter. */
+/*
+ * Largest |g_uu|/g of all channels that scatter, or some value from limit on if it is not below limit: then
+ * *first is where, and the next axis is looked at there first, since most that are too bad are so there.
+ */
 static double bend_max(const struct curve *curve, const struct scaled *scaled, double end, double power,
-                       double falloff)
+                       double falloff, double limit, int *first)
 {
     const double phi = stretched(end, power);
+    const int begin = *first, points = AXIS_POINTS - 2;
     double worst = 0;
-    for (int j = 1; j + 1 < AXIS_POINTS; j++) {
+    for (int i = 0; i < points && worst < limit; i++) {
+        const int j = 1 + (begin + i) % points;
         const double m = scaled->m[j], m_y = scaled->m_y[j];
         const double stretch = power == 0 ? 1 : exp(power * scaled->log_w[j]);
         const double over_u_y = phi / (stretch * m), u_yy_over_u_y = power * m + m_y / m;
@@ -110,6 +115,8 @@ static double bend_max(const struct curve *curve, const struct scaled *scaled, d
             const double bend = (g_yy + g_y * (g_y - u_yy_over_u_y)) * (over_u_y * over_u_y);
             worst = fmax(worst, curve->weight[c][j] * fabs(bend));
         }
+        if (worst >= limit)
+            *first = j - 1;
     }
     return worst;
 }
@@ -124,6 +131,7 @@ static struct place search(const struct curve *curve, double r_max_mm, double sh
 {
     struct place best = { .log_scale = 0.5, .power = 0.2, .bend = INFINITY };
     double scale_step = 1, power_step = 0.1;
+    int first = 0;
     for (int round = 0; round < 6; round++, scale_step /= 2, power_step /= 2) {
         const struct place centre = best;
         for (int i = -2; i <= 2; i++) {
@@ -136,7 +144,8 @@ static struct place search(const struct curve *curve, double r_max_mm, double sh
                 is_held = has_range(curve, &scaled, c, falloff, log_range_limit);
             for (int j = -2; j <= 2 && is_held; j++) {
                 place.power = fmax(centre.power + j * power_step, 0);
-                place.bend = bend_max(curve, &scaled, r_max_mm / scale_mm, place.power, falloff);
+                place.bend =
+                    bend_max(curve, &scaled, r_max_mm / scale_mm, place.power, falloff, best.bend, &first);
                 if (place.bend < best.bend)
                     best = place;
             }

@@ -59,7 +59,7 @@ struct lut_hash lut_request_hash(const struct lut_request *request)
         lut_hash_number(&hash, request->size[i]);
     for (size_t i = 0; i < request->material_count; i++) {
         const struct io_material *const material = &request->materials[i];
-        lut_hash_text(&hash, material->name); /* texts stand in the attributes */
+        lut_hash_text(&hash, material->name);
         lut_hash_text(&hash, material->source);
         for (size_t k = 0; k < material->layer_count; k++)
             lut_hash_text(&hash, material->layer_names[k]);
@@ -82,14 +82,23 @@ struct lut_hash lut_material_hash(const struct io_material *material)
     return lut_hash_print(hash);
 }
 
-struct lut_hash lut_content_hash(const float *texels, size_t count)
+struct lut_hash lut_content_hash(const struct io_image *image)
 {
+    const size_t count = (size_t)image->width_px * (size_t)image->height_px * (size_t)image->channel_count;
     uint64_t hash = LUT_HASH_START;
     for (size_t i = 0; i < count; i++) {
         uint32_t bits;
-        const float value = texels[i] + 0.0F;
+        const float value = image->pixels[i] + 0.0F;
         memcpy(&bits, &value, sizeof bits);
         hash_low_first(&hash, bits, 4);
+    }
+    for (size_t i = 0; i < image->attribute_count; i++) {
+        const struct io_attribute *const attribute = &image->attributes[i];
+        lut_hash_text(&hash, attribute->name);
+        if (attribute->kind == IO_ATTRIBUTE_TEXT)
+            lut_hash_text(&hash, attribute->text);
+        for (int k = 0; attribute->kind != IO_ATTRIBUTE_TEXT && k < 3; k++)
+            lut_hash_number(&hash, attribute->numbers[k]);
     }
     return lut_hash_print(hash);
 }

@@ -58,6 +58,13 @@ enum { AXIS_POINTS = 128 };
 double lut_axis_find(const struct lut_profile profiles[IO_CHANNEL_COUNT], double log_range_limit,
                      struct lut_axis *axis_out, double *falloff_out);
 
+/* ---- rows of splat tables (splat.c) -------------------------------------------------------------- */
+
+/* Texels of a row whose axis and falloff are set; sets its scale and core. */
+DIPOLE_CHECKED bool lut_splat_row_bake(struct lut_splat_row *row,
+                                       const struct lut_profile profiles[IO_CHANNEL_COUNT], bool is_half,
+                                       float *rgb, dipole_status *status);
+
 /* ---- attributes of files (attributes.c) ---------------------------------------------------------- */
 
 /* Attributes that are being set: the first failure ends the rest. */
@@ -69,8 +76,7 @@ void lut_put_text(struct lut_writer *writer, const char *name, const char *text)
 void lut_put_number(struct lut_writer *writer, const char *name, double value);
 void lut_put_numbers(struct lut_writer *writer, const char *name, const double values[3]);
 void lut_put_json(struct lut_writer *writer, const char *name, json_t *json); /* takes json; NULL fails */
-/* What every kind ends with: storage, version, hashes of the texels, of the inputs and of all attributes.
- */
+/* What every kind ends with: storage, version, hashes of the inputs and of all that was set before. */
 void lut_put_end(struct lut_writer *writer, const struct lut_request *request);
 /* A table's one material. */
 void lut_put_material(struct lut_writer *writer, const struct io_material *material);
@@ -111,8 +117,8 @@ void lut_hash_number(uint64_t *hash, double value);   /* low byte first on every
 void lut_hash_material(uint64_t *hash, const struct io_material *material);
 struct lut_hash lut_hash_print(uint64_t hash);
 
-/* Of the texels as stored. */
-struct lut_hash lut_content_hash(const float *texels, size_t count);
+/* Of the texels as stored, and of the attributes that are set. */
+struct lut_hash lut_content_hash(const struct io_image *image);
 
 /* ---- random numbers ----------------------------------------------------------------------------- */
 

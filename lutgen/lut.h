@@ -36,8 +36,8 @@ struct lut_request {
     bool is_half;          /* texels are rounded to half; epsilon must then be above 4.9e-4 */
 };
 
-/* Of all that decides the bytes of the table: the request, the materials with their texts, the library's
- * version. */
+/* Of all that decides the bytes of the table: the request with the materials' names and sources, the
+ * library's version. */
 struct lut_hash lut_request_hash(const struct lut_request *request);
 
 /* Largest relative error, and the one that 99 % of random points stay below. */
@@ -112,8 +112,8 @@ DIPOLE_CHECKED bool lut_splat_audit(const struct lut_splat *lut, size_t row, int
 DIPOLE_CHECKED bool lut_splat_to_image(const struct lut_splat *lut, enum lut_kind kind,
                                        struct io_image **image_out, dipole_status *status);
 
-/* Back from a picture. Fails with DIPOLE_BAD_VALUE, naming the attribute that is missing, out of range or
- * at odds with the others or with the texels; path is for messages. */
+/* Back from a picture. Fails with DIPOLE_BAD_VALUE or DIPOLE_BAD_SYNTAX, naming the attribute that is
+ * missing, out of range or at odds with the others or with the texels; path is for messages. */
 DIPOLE_CHECKED bool lut_splat_from_image(const struct io_image *image, const char *path,
                                          struct lut_splat **lut_out, dipole_status *status);
 

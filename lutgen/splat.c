@@ -14,7 +14,7 @@ static const double audit_margin = 1.01;
 static double weight_at(const struct lut_splat_row *row, double r_mm)
 {
     const double x = r_mm / row->axis.scale_mm;
-    return row->falloff == 0 ? 1 : exp(row->falloff * log1p(x * x));
+    return row->falloff == 0 ? 1 : pow(1 + x * x, row->falloff);
 }
 
 /* ---- nodes -------------------------------------------------------------------------------------- */
@@ -23,15 +23,13 @@ static double weight_at(const struct lut_splat_row *row, double r_mm)
  * Linear interpolation between exact nodes errs to one side. Each node is moved by a quarter of the errors
  * in the middle of its two intervals, which halves the largest.
  */
-static void channel_bake(const struct lut_splat_row *row, const struct lut_profile *profile, double *r_mm,
-                         double *values)
+static void channel_bake(const struct lut_profile *profile, const double *r_mm, const double *weights,
+                         int last, double *values)
 {
-    const int last = row->axis.node_count - 1;
-    for (int i = 0; i <= 2 * last; i++)
-        r_mm[i] = lut_axis_r_mm(&row->axis, 0.5 * i);
-    lut_profile_evaluate(profile, r_mm, (size_t)(2 * last + 1), values);
-    for (int i = 0; i <= 2 * last; i++)
-        values[i] *= weight_at(row, r_mm[i]);
+    const size_t count = 2 * (size_t)last + 1;
+    lut_profile_evaluate(profile, r_mm, count, values);
+    for (size_t i = 0; i < count; i++)
+        values[i] *= weights[i];
     double before = 0;
     for (int i = 0; i <= last; i++) { /* the interval after node i still has its exact ends */
         double *const node = &values[2 * i];
@@ -41,16 +39,20 @@ static void channel_bake(const struct lut_splat_row *row, const struct lut_profi
     }
 }
 
-static bool row_bake(struct lut_splat_row *row, const struct lut_profile profiles[IO_CHANNEL_COUNT],
-                     bool is_half, float *rgb, dipole_status *status)
+bool lut_splat_row_bake(struct lut_splat_row *row, const struct lut_profile profiles[IO_CHANNEL_COUNT],
+                        bool is_half, float *rgb, dipole_status *status)
 {
     const size_t count = (size_t)(2 * row->axis.node_count - 1);
-    double *const work = malloc(2 * count * sizeof *work);
+    double *const work = malloc(3 * count * sizeof *work);
     if (!work)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a table");
-    double *const r_mm = work, *const values = work + count;
+    double *const r_mm = work, *const weights = work + count, *const values = work + 2 * count;
+    for (size_t i = 0; i < count; i++) {
+        r_mm[i] = lut_axis_r_mm(&row->axis, 0.5 * (double)i);
+        weights[i] = weight_at(row, r_mm[i]);
+    }
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        channel_bake(row, &profiles[c], r_mm, values);
+        channel_bake(&profiles[c], r_mm, weights, row->axis.node_count - 1, values);
         double most = 0;
         for (int i = 0; i < row->axis.node_count; i++)
             most = fmax(most, values[2 * (size_t)i]);
@@ -111,19 +113,21 @@ static bool row_audit(const struct lut_splat_row *row, const float *rgb,
                       struct lut_error *error_out, dipole_status *status)
 {
     const size_t most = (size_t)row->axis.node_count * ((size_t)per_node + 1);
-    double *const work = malloc(5 * most * sizeof *work);
+    double *const work = malloc((1 + 2 * IO_CHANNEL_COUNT) * most * sizeof *work);
     if (!work)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for the audit of a table");
-    double *const r_mm = work, *const exact = work + most, *const errors = work + 2 * most;
+    double *const r_mm = work, *const exact = work + most,
+                  *const errors = work + (1 + IO_CHANNEL_COUNT) * most;
     const size_t count = points_choose(&row->axis, per_node, seed, r_mm);
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        lut_profile_evaluate(&profiles[c], r_mm, count, exact);
-        for (size_t i = 0; i < count; i++) {
-            double sampled[IO_CHANNEL_COUNT];
-            row_sample(row, rgb, lut_axis_index(&row->axis, r_mm[i]), r_mm[i], sampled);
-            const double difference = fabs(sampled[c] - exact[i]);
-            errors[(size_t)c * count + i] =
-                difference > 0 ? difference / fmax(exact[i], profiles[c].floor_per_mm2) : 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        lut_profile_evaluate(&profiles[c], r_mm, count, exact + (size_t)c * count);
+    for (size_t i = 0; i < count; i++) {
+        double sampled[IO_CHANNEL_COUNT];
+        row_sample(row, rgb, lut_axis_index(&row->axis, r_mm[i]), r_mm[i], sampled);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            const size_t at = (size_t)c * count + i;
+            const double difference = fabs(sampled[c] - exact[at]);
+            errors[at] = difference > 0 ? difference / fmax(exact[at], profiles[c].floor_per_mm2) : 0;
         }
     }
     *error_out = lut_error_of(errors, IO_CHANNEL_COUNT * count);
@@ -159,7 +163,7 @@ static bool draft_try(struct draft *draft, int node_count, int per_node, float *
 {
     struct lut_splat_row *const row = draft->row;
     row->axis.node_count = node_count;
-    if (!row_bake(row, draft->profiles, draft->is_half, rgb, status) ||
+    if (!lut_splat_row_bake(row, draft->profiles, draft->is_half, rgb, status) ||
         !row_audit(row, rgb, draft->profiles, per_node, LUT_SEED_BAKE, &row->error, status))
         return false;
     row->error.max *= audit_margin;

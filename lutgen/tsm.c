@@ -1,10 +1,12 @@
 /* Baking of a translucent-shadow-map volume. T32. */
 #include "lutgen/tsm.h"
 
+#include "io/half.h"
 #include "lutgen/parallel.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* ---- rows ---------------------------------------------------------------------------------- */
 
@@ -13,6 +15,26 @@ struct row_loop {
     const struct lut_tsm_plan *plan;
     struct lut_tsm_work *works; /* per row */
 };
+
+/* The same part of a row in the slices of all members of a class. */
+static void class_bake(const struct lut_tsm_plan *plan, const struct lut_cell_class *class, int t,
+                       double dz_mm, const struct lut_tsm_work *work)
+{
+    const struct lut_tsm *const lut = plan->lut;
+    const size_t count = (size_t)lut->size[0];
+    const double part = lut_tsm_global_part(plan, class->members[0], dz_mm);
+    float *const first = lut_tsm_texel(lut, 0, t, class->members[0]);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!plan->profiles[c].stack)
+            continue;
+        lut_tsm_response(plan, c, class->members[0], dz_mm, count, work);
+        for (size_t s = 0; s < count; s++)
+            first[s * IO_CHANNEL_COUNT + (size_t)c] = (float)(part * work->values[s]);
+    }
+    for (int i = 1; i < class->member_count; i++)
+        memcpy(lut_tsm_texel(lut, 0, t, class->members[i]), first,
+               count * IO_CHANNEL_COUNT * sizeof *first);
+}
 
 static void row_bake(void *context, int t)
 {
@@ -23,18 +45,11 @@ static void row_bake(void *context, int t)
     const double dz_mm = lut_tsm_depth_mm(lut, t);
     for (int s = 0; s < lut->size[0]; s++)
         work->cosines[s] = 2.0 * s / (lut->size[0] - 1) - 1;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        if (!plan->profiles[c].stack)
-            continue;
-        lut_tsm_means_find(plan, c, dz_mm, work);
-        for (int r = 0; r < lut->sample_count; r++) {
-            lut_tsm_response(plan, c, r, dz_mm, (size_t)lut->size[0], work);
-            const double part = lut_tsm_global_part(plan, r, dz_mm);
-            float *const out = lut_tsm_texel(lut, 0, t, r) + c;
-            for (int s = 0; s < lut->size[0]; s++)
-                out[(size_t)s * IO_CHANNEL_COUNT] = (float)(part * work->values[s]);
-        }
-    }
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        if (plan->profiles[c].stack)
+            lut_tsm_means_find(plan, c, dz_mm, work);
+    for (int k = 0; k < plan->class_count; k++)
+        class_bake(plan, &plan->classes[k], t, dz_mm, work);
 }
 
 /* Kernel and depth factors: in row 0 where the light enters above the point, in row 1 below. */
@@ -53,14 +68,29 @@ static void local_bake(const struct lut_tsm_plan *plan, const struct lut_tsm_wor
             for (int s = 0; s < lut->size[0]; s++) {
                 const double dz_mm = (row == 0 ? 1 : -1) * lut_tsm_local_depth_mm(lut, s);
                 lut_tsm_texel(lut, s, row, lut_tsm_depth_slice(lut))[c] =
-                    (float)(lut_tsm_proximity(lut, dz_mm) * lut_tsm_means_find(plan, c, dz_mm, work));
+                    (float)(lut_tsm_proximity(lut, dz_mm) * lut_tsm_inner_part(plan, c, dz_mm, work));
             }
     }
 }
 
-static bool volume_bake(const struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
+static bool texels_create(struct lut_tsm *lut, dipole_status *status)
+{
+    const size_t count =
+        (size_t)lut->size[0] * (size_t)lut->size[1] * (size_t)lut->size[2] * IO_CHANNEL_COUNT;
+    free(lut->rgb);
+    lut->rgb = calloc(count, sizeof *lut->rgb);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        lut->scale[c] = 1;
+    return lut->rgb ||
+           dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume of %d x %d x %d",
+                       lut->size[0], lut->size[1], lut->size[2]);
+}
+
+bool lut_tsm_plan_bake(const struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
 {
     const int rows = plan->lut->size[1];
+    if (!texels_create(plan->lut, status))
+        return false;
     struct lut_tsm_work *const works = calloc((size_t)rows, sizeof *works);
     struct row_loop loop = { .plan = plan, .works = works };
     bool is_done = works != NULL;
@@ -80,27 +110,30 @@ static bool volume_bake(const struct lut_tsm_plan *plan, int thread_count, dipol
  */
 static void volume_round(struct lut_tsm *lut)
 {
-    const int factors = lut_tsm_depth_slice(lut);
-    double most[IO_CHANNEL_COUNT] = { 0 };
-    for (int pass = 0; pass < 2; pass++) {
-        for (int t = 0; t < lut->size[1]; t++)
-            for (int r = 0; r <= factors; r++)
-                for (int s = 0; s < lut->size[0]; s++)
-                    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-                        float *const value = &lut_tsm_texel(lut, s, t, r)[c];
-                        if (pass == 0 && r < factors)
-                            most[c] = fmax(most[c], (double)*value);
-                        else if (pass == 1)
-                            *value =
-                                (float)lut_half_round((double)*value / (r < factors ? lut->scale[c] : 1));
-                    }
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            lut->scale[c] = lut_half_scale(most[c]);
+    const size_t width = (size_t)lut->size[0] * (size_t)lut->size[2] * IO_CHANNEL_COUNT;
+    const size_t scaled = (size_t)lut->size[0] * (size_t)lut_tsm_depth_slice(lut) * IO_CHANNEL_COUNT;
+    float most[IO_CHANNEL_COUNT] = { 0 };
+    double over_scale[IO_CHANNEL_COUNT];
+    for (int t = 0; t < lut->size[1]; t++)
+        for (size_t i = 0; i < scaled; i++) {
+            const float value = lut->rgb[(size_t)t * width + i];
+            most[i % IO_CHANNEL_COUNT] =
+                value > most[i % IO_CHANNEL_COUNT] ? value : most[i % IO_CHANNEL_COUNT];
+        }
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        lut->scale[c] = lut_half_scale((double)most[c]);
+        over_scale[c] = 1 / lut->scale[c];
     }
+    for (int t = 0; t < lut->size[1]; t++)
+        for (size_t i = 0; i < width; i++) {
+            float *const value = &lut->rgb[(size_t)t * width + i];
+            const float held =
+                i < scaled ? (float)((double)*value * over_scale[i % IO_CHANNEL_COUNT]) : *value;
+            *value = io_float_from_half(io_half_from_float(held));
+        }
 }
 
-/* ---- the size that keeps epsilon
- * ---------------------------------------------------------------------------------- */
+/* ---- the size that keeps epsilon ----------------------------------------------------------------- */
 
 /* What lies between the points of an audit can be so much larger. */
 static const double audit_margin = 1.25;
@@ -108,16 +141,7 @@ static const double audit_margin = 1.25;
 static bool try_size(struct lut_tsm_plan *plan, int thread_count, dipole_status *status)
 {
     struct lut_tsm *const lut = plan->lut;
-    const size_t count =
-        (size_t)lut->size[0] * (size_t)lut->size[1] * (size_t)lut->size[2] * IO_CHANNEL_COUNT;
-    free(lut->rgb);
-    lut->rgb = calloc(count, sizeof *lut->rgb);
-    if (!lut->rgb)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume of %d x %d x %d",
-                           lut->size[0], lut->size[1], lut->size[2]);
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        lut->scale[c] = 1;
-    if (!volume_bake(plan, thread_count, status))
+    if (!lut_tsm_plan_bake(plan, thread_count, status))
         return false;
     if (lut->is_half)
         volume_round(lut);

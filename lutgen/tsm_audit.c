@@ -6,7 +6,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Most cosines at each depth, one in each of as many parts: one in each interval up to as many. */
+/* Most cosines at each depth for each class of cells, one in each of as many parts: one in each interval up
+ * to as many. */
 enum { COSINE_LIMIT = 64 };
 
 /* An index of an axis in part `part` of `parts`: at a node; in the middle between two, where linear
@@ -34,43 +35,54 @@ struct audit {
     enum lut_tsm_audit_kind kind;
     int depth_count, cosine_count;
     unsigned seed;
-    size_t room; /* errors of one round */
-    double *errors;
+    int channel_count; /* that scatter */
+    size_t room;       /* errors of one depth */
+    double *errors;    /* of all depths, then channel_count for each depth factor */
     struct lut_tsm_work *works;
 };
 
-/* Errors at one depth, for every sample and channel at some cosines: of two rounds one is in the middle
+/* Errors of one class at one depth: points in the slices of its members by turns. */
+static double *class_audit(const struct audit *audit, const struct lut_cell_class *class, double t,
+                           double dz_mm, enum place place, uint64_t *random,
+                           const struct lut_tsm_work *work, double *errors)
+{
+    const struct lut_tsm_plan *const plan = audit->plan;
+    const struct lut_tsm *const lut = plan->lut;
+    const double part = lut_tsm_global_part(plan, class->members[0], dz_mm);
+    double sampled[COSINE_LIMIT][IO_CHANNEL_COUNT];
+    for (int k = 0; k < audit->cosine_count; k++) {
+        const double s = index_choose(random, lut->size[0], k, audit->cosine_count, place);
+        work->cosines[k] = 2 * s / (lut->size[0] - 1) - 1;
+        lut_tsm_sample_at(lut, class->members[k % class->member_count], s, t, sampled[k]);
+    }
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!plan->profiles[c].stack)
+            continue;
+        lut_tsm_response(plan, c, class->members[0], dz_mm, (size_t)audit->cosine_count, work);
+        for (int k = 0; k < audit->cosine_count; k++)
+            *errors++ = fabs(sampled[k][c] - part * work->values[k]) /
+                        fmax(work->values[k], plan->profiles[c].floor_per_mm2);
+    }
+    return errors;
+}
+
+/* Errors at one depth, for every class and channel at some cosines: of two rounds one is in the middle
  * along both axes, so that with two rounds to an interval of T no middle is left out. */
 static void depth_audit(const struct audit *audit, int round, uint64_t *random, double *errors)
 {
     const struct lut_tsm_plan *const plan = audit->plan;
     const struct lut_tsm *const lut = plan->lut;
     const struct lut_tsm_work *const work = &audit->works[round];
-    const int cosine_count = audit->cosine_count;
     const enum place off_grid = round % 2 == 0 ? IN_MIDDLE : ANYWHERE;
     const double t = index_choose(random, lut->size[1], round, audit->depth_count,
                                   audit->kind == LUT_AUDIT_S ? AT_NODE : off_grid);
     const double dz_mm = lut_tsm_depth_mm(lut, t);
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        if (!plan->profiles[c].stack)
-            continue;
-        lut_tsm_means_find(plan, c, dz_mm, work);
-        for (int r = 0; r < lut->sample_count; r++) {
-            for (int k = 0; k < cosine_count; k++) {
-                const double s = index_choose(random, lut->size[0], k, cosine_count,
-                                              audit->kind == LUT_AUDIT_T ? AT_NODE : off_grid);
-                work->cosines[k] = 2 * s / (lut->size[0] - 1) - 1;
-            }
-            lut_tsm_response(plan, c, r, dz_mm, (size_t)cosine_count, work);
-            const double part = lut_tsm_global_part(plan, r, dz_mm);
-            for (int k = 0; k < cosine_count; k++) {
-                double sampled[IO_CHANNEL_COUNT];
-                lut_tsm_sample(lut, r, work->cosines[k], dz_mm, sampled);
-                *errors++ = fabs(sampled[c] - part * work->values[k]) /
-                            fmax(work->values[k], plan->profiles[c].floor_per_mm2);
-            }
-        }
-    }
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        if (plan->profiles[c].stack)
+            lut_tsm_means_find(plan, c, dz_mm, work);
+    for (int k = 0; k < plan->class_count; k++)
+        errors = class_audit(audit, &plan->classes[k], t, dz_mm,
+                             audit->kind == LUT_AUDIT_T ? AT_NODE : off_grid, random, work, errors);
 }
 
 /* The same of the local response's depth factor, relative to the whole response, too. */
@@ -84,9 +96,9 @@ static void local_audit(const struct audit *audit, int round, double *errors)
         if (!plan->profiles[c].stack)
             continue;
         double sampled[IO_CHANNEL_COUNT];
-        const double whole = lut_tsm_means_find(plan, c, dz_mm, &audit->works[round]);
+        const double whole = lut_tsm_inner_part(plan, c, dz_mm, &audit->works[round]);
         lut_tsm_local_depth_factor(lut, dz_mm, sampled);
-        errors[c] = fabs(sampled[c] - lut_tsm_proximity(lut, dz_mm) * whole) / whole;
+        *errors++ = fabs(sampled[c] - lut_tsm_proximity(lut, dz_mm) * whole) / whole;
     }
 }
 
@@ -94,19 +106,22 @@ static void round_run(void *context, int round)
 {
     const struct audit *const audit = context;
     uint64_t random = ((uint64_t)audit->seed << 32) + (uint64_t)round;
-    double *const errors = audit->errors + (size_t)round * audit->room;
+    const size_t depths = (size_t)audit->depth_count, i = (size_t)round;
     if (round < audit->depth_count)
-        depth_audit(audit, round, &random, errors);
+        depth_audit(audit, round, &random, audit->errors + i * audit->room);
     else
-        local_audit(audit, round, errors);
+        local_audit(audit, round,
+                    audit->errors + depths * audit->room + (i - depths) * (size_t)audit->channel_count);
 }
 
 /* Those of the volume give the percentile; those of the local response count for the largest. */
-static struct lut_error errors_sum(const struct audit *audit, int rounds)
+static struct lut_error errors_sum(const struct audit *audit, size_t count)
 {
     const size_t of_volume = (size_t)audit->depth_count * audit->room;
-    struct lut_error error = lut_error_of(audit->errors, of_volume);
-    for (size_t i = of_volume; i < (size_t)rounds * audit->room; i++)
+    struct lut_error error = { 0 };
+    if (of_volume > 0)
+        error = lut_error_of(audit->errors, of_volume);
+    for (size_t i = of_volume; i < count; i++)
         error.max = fmax(error.max, audit->errors[i]);
     return error;
 }
@@ -121,16 +136,19 @@ bool lut_tsm_plan_audit(const struct lut_tsm_plan *plan, enum lut_tsm_audit_kind
                            .depth_count = depth_count,
                            .cosine_count = intervals < COSINE_LIMIT ? intervals : COSINE_LIMIT,
                            .seed = seed };
-    audit.room = (size_t)plan->lut->sample_count * (size_t)audit.cosine_count * IO_CHANNEL_COUNT;
-    const size_t count = (size_t)rounds * audit.room;
-    audit.errors = calloc(count, sizeof *audit.errors);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        audit.channel_count += plan->profiles[c].stack != NULL;
+    audit.room = (size_t)plan->class_count * (size_t)audit.cosine_count * (size_t)audit.channel_count;
+    const size_t count =
+        (size_t)depth_count * audit.room + (size_t)(rounds - depth_count) * (size_t)audit.channel_count;
+    audit.errors = malloc((count + 1) * sizeof *audit.errors); /* + 1: nothing may scatter */
     audit.works = calloc((size_t)rounds, sizeof *audit.works);
     bool is_done = audit.errors && audit.works;
     for (int i = 0; i < rounds && is_done; i++)
         is_done = lut_tsm_work_create(plan, (size_t)audit.cosine_count, &audit.works[i]);
     if (is_done) {
         lut_parallel_for(rounds, thread_count, round_run, &audit);
-        *error_out = errors_sum(&audit, rounds);
+        *error_out = errors_sum(&audit, count);
     }
     for (int i = 0; i < rounds && audit.works; i++)
         lut_tsm_work_end(&audit.works[i]);

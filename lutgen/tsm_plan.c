@@ -24,7 +24,7 @@ static const double gauss_w[LUT_GAUSS_POINTS] = { 0.1012285362903763, 0.22238103
                                                   0.2223810344533745, 0.1012285362903763 };
 
 /* Radii and weights of the sum for one polygon; returns how many. */
-static int polygon_rule(const double corners[4][2], double scale_mm, double *r_mm, double *weight)
+static int polygon_rule(const double (*corners)[2], double scale_mm, double *r_mm, double *weight)
 {
     int count = 0;
     for (int k = 0; k < 4; k++) {
@@ -56,9 +56,39 @@ static bool are_mirrored(const struct lut_cell *a, const struct lut_cell *b)
            fabs(fmin(au, av) - fmin(bu, bv)) < small;
 }
 
+/* Cells share edges, and most are symmetric: most radii occur more than once. */
+static int radius_find(struct lut_tsm_plan *plan, double r_mm)
+{
+    int i = 0;
+    while (i < plan->radius_count && fabs(plan->r_mm[i] - r_mm) > 1e-12 * r_mm)
+        i++;
+    if (i == plan->radius_count)
+        plan->r_mm[plan->radius_count++] = r_mm;
+    return i;
+}
+
+static void class_init(struct lut_tsm_plan *plan, const struct lut_cell *cell, struct lut_cell_class *class)
+{
+    double r_mm[LUT_RULE_LIMIT], weight[LUT_RULE_LIMIT];
+    *class = (struct lut_cell_class){ .cell = *cell, .first = plan->term_count };
+    const int count = polygon_rule(cell->corners, plan->lut->inner_mm, r_mm, weight);
+    struct lut_rule_term *const terms = plan->terms + class->first;
+    for (int i = 0; i < count; i++) {
+        const int radius = radius_find(plan, r_mm[i]);
+        int k = 0;
+        while (k < class->count && terms[k].radius != radius)
+            k++;
+        if (k == class->count)
+            terms[class->count++] = (struct lut_rule_term){ .radius = radius };
+        terms[k].weight += weight[i];
+    }
+    plan->term_count += class->count;
+    if (cell->is_inner) /* they come first */
+        plan->inner_radius_count = plan->radius_count;
+}
+
 static void classes_find(struct lut_tsm_plan *plan)
 {
-    plan->class_count = plan->radius_count = 0;
     for (int i = 0; i < plan->lut->sample_count; i++) {
         int k = 0;
         while (k < plan->class_count && !are_mirrored(&plan->classes[k].cell, &plan->cells[i]))
@@ -66,40 +96,59 @@ static void classes_find(struct lut_tsm_plan *plan)
         struct lut_cell_class *const class = &plan->classes[k];
         if (k == plan->class_count) {
             plan->class_count++;
-            *class = (struct lut_cell_class){ .cell = plan->cells[i], .first = plan->radius_count };
-            class->count = polygon_rule(class->cell.corners, plan->lut->inner_mm, plan->r_mm + class->first,
-                                        plan->weight + class->first);
-            plan->radius_count += class->count;
+            class_init(plan, &plan->cells[i], class);
         }
-        class->member_count++;
+        class->members[class->member_count++] = i;
         plan->class_of[i] = k;
     }
     plan->r_mm[plan->radius_count] = INFINITY;
 }
 
-double lut_tsm_means_find(const struct lut_tsm_plan *plan, int channel, double dz_mm,
-                          const struct lut_tsm_work *work)
+/* Of one cell. Far out the sum of turns leaves a rounding of the total. */
+static double class_power(const struct lut_tsm_plan *plan, const struct lut_cell_class *class,
+                          const double *within)
 {
-    double *const within = work->within, *const means = work->means;
+    double power = 0;
+    for (int i = class->first; i < class->first + class->count; i++)
+        power += plan->terms[i].weight * within[plan->terms[i].radius];
+    return fmax(power, 0);
+}
+
+void lut_tsm_means_find(const struct lut_tsm_plan *plan, int channel, double dz_mm,
+                        const struct lut_tsm_work *work)
+{
+    double *const within = work->within, *const means = work->means + channel * plan->class_count;
     const double inner_area = plan->lut->inner_mm * plan->lut->inner_mm;
     dipole_sources_within_many(&plan->sources[channel], -dz_mm, plan->r_mm, (size_t)plan->radius_count + 1,
                                within);
-    double inner = 0, rest = within[plan->radius_count], outermost = 0;
+    double rest = within[plan->radius_count], outermost = 0;
     for (int k = 0; k < plan->class_count; k++) {
         const struct lut_cell_class *const class = &plan->classes[k];
-        double power = 0;
-        for (int i = class->first; i < class->first + class->count; i++)
-            power += plan->weight[i] * within[i];
-        power = fmax(power, 0); /* far out the sum of turns leaves a rounding of the total */
+        const double power = class_power(plan, class, within);
         means[k] = power / (class->cell.area * inner_area);
-        inner += class->cell.is_inner ? power * class->member_count : 0;
         outermost += class->cell.is_outermost ? power * class->member_count : 0;
         rest -= power * class->member_count;
     }
     for (int k = 0; k < plan->class_count && outermost > 0; k++)
         if (plan->classes[k].cell.is_outermost)
             means[k] *= 1 + fmax(rest, 0) / outermost;
-    return plan->flat_inner_power[channel] > 0 ? inner / plan->flat_inner_power[channel] : inner;
+}
+
+static double inner_power(const struct lut_tsm_plan *plan, int channel, double dz_mm,
+                          const struct lut_tsm_work *work)
+{
+    dipole_sources_within_many(&plan->sources[channel], -dz_mm, plan->r_mm,
+                               (size_t)plan->inner_radius_count, work->within);
+    double power = 0;
+    for (int k = 0; k < plan->class_count && plan->classes[k].cell.is_inner; k++)
+        power += class_power(plan, &plan->classes[k], work->within) * plan->classes[k].member_count;
+    return power;
+}
+
+double lut_tsm_inner_part(const struct lut_tsm_plan *plan, int channel, double dz_mm,
+                          const struct lut_tsm_work *work)
+{
+    return inner_power(plan, channel, dz_mm, work) / plan->flat_inner_power[channel];
 }
 
 /* The response at the cell's centre, by the distance to the sources, times mean over centre where the
@@ -107,15 +156,17 @@ double lut_tsm_means_find(const struct lut_tsm_plan *plan, int channel, double d
 void lut_tsm_response(const struct lut_tsm_plan *plan, int channel, int sample, double dz_mm, size_t count,
                       const struct lut_tsm_work *work)
 {
-    const double inner_mm = plan->lut->inner_mm, mean = work->means[plan->class_of[sample]];
-    const double u = plan->cells[sample].centre[0] * inner_mm, v = plan->cells[sample].centre[1] * inner_mm;
-    const double distance = sqrt(u * u + v * v + dz_mm * dz_mm),
-                 facing = distance > 0 ? -dz_mm / distance : 1;
-    double centre;
-    dipole_sources_profile_per_mm2(&plan->sources[channel], distance, &facing, 1, &centre);
-    dipole_sources_profile_per_mm2(&plan->sources[channel], distance, work->cosines, count, work->values);
+    const int k = plan->class_of[sample];
+    const double *const centre = plan->classes[k].cell.centre;
+    const double u = centre[0] * plan->lut->inner_mm, v = centre[1] * plan->lut->inner_mm;
+    const double distance = sqrt(u * u + v * v + dz_mm * dz_mm);
+    work->cosines[count] = distance > 0 ? -dz_mm / distance : 1;
+    dipole_sources_profile_per_mm2(&plan->sources[channel], distance, work->cosines, count + 1,
+                                   work->values);
+    const double mean = work->means[channel * plan->class_count + k];
+    const double factor = work->values[count] > 0 ? mean / work->values[count] : 0;
     for (size_t i = 0; i < count; i++)
-        work->values[i] = centre > 0 ? work->values[i] * (mean / centre) : 0;
+        work->values[i] *= factor;
 }
 
 double lut_tsm_global_part(const struct lut_tsm_plan *plan, int sample, double dz_mm)
@@ -123,22 +174,31 @@ double lut_tsm_global_part(const struct lut_tsm_plan *plan, int sample, double d
     return plan->cells[sample].is_inner ? 1 - lut_tsm_proximity(plan->lut, dz_mm) : 1;
 }
 
+static double kernel_mean(const struct lut_tsm_plan *plan, int channel, int i, int j)
+{
+    const double side = 1.0 / LUT_TSM_LOCAL_SIDE, cell_mm = side * plan->lut->inner_mm;
+    const double u = i * side - 0.5, v = j * side - 0.5;
+    const double corners[4][2] = { { u, v }, { u + side, v }, { u + side, v + side }, { u, v + side } };
+    double r_mm[LUT_RULE_LIMIT], weight[LUT_RULE_LIMIT], within[LUT_RULE_LIMIT], power = 0;
+    const int count = polygon_rule(corners, plan->lut->inner_mm, r_mm, weight);
+    dipole_sources_within_many(&plan->sources[channel], 0, r_mm, (size_t)count, within);
+    for (int k = 0; k < count; k++)
+        power += weight[k] * within[k];
+    return power / (cell_mm * cell_mm);
+}
+
+/* Cells are each other's mirror images in eight ways. */
 void lut_tsm_kernel_find(const struct lut_tsm_plan *plan, int channel,
                          double means[LUT_TSM_LOCAL_SIDE * LUT_TSM_LOCAL_SIDE])
 {
-    const double side = 1.0 / LUT_TSM_LOCAL_SIDE, cell_mm = side * plan->lut->inner_mm;
-    for (int j = 0; j < LUT_TSM_LOCAL_SIDE; j++)
-        for (int i = 0; i < LUT_TSM_LOCAL_SIDE; i++) {
-            const double u = i * side - 0.5, v = j * side - 0.5;
-            const double corners[4][2] = {
-                { u, v }, { u + side, v }, { u + side, v + side }, { u, v + side }
-            };
-            double r_mm[LUT_RULE_LIMIT], weight[LUT_RULE_LIMIT], within[LUT_RULE_LIMIT], power = 0;
-            const int count = polygon_rule(corners, plan->lut->inner_mm, r_mm, weight);
-            dipole_sources_within_many(&plan->sources[channel], 0, r_mm, (size_t)count, within);
-            for (int k = 0; k < count; k++)
-                power += weight[k] * within[k];
-            means[j * LUT_TSM_LOCAL_SIDE + i] = power / (cell_mm * cell_mm);
+    const int last = LUT_TSM_LOCAL_SIDE - 1;
+    for (int j = 0; j <= last / 2; j++)
+        for (int i = 0; i <= j; i++) {
+            const double mean = kernel_mean(plan, channel, i, j);
+            for (int mirror = 0; mirror < 8; mirror++) {
+                const int x = mirror & 1 ? last - i : i, y = mirror & 2 ? last - j : j;
+                means[mirror & 4 ? x * LUT_TSM_LOCAL_SIDE + y : y * LUT_TSM_LOCAL_SIDE + x] = mean;
+            }
         }
 }
 
@@ -146,11 +206,12 @@ void lut_tsm_kernel_find(const struct lut_tsm_plan *plan, int channel,
 
 bool lut_tsm_work_create(const struct lut_tsm_plan *plan, size_t cosine_count, struct lut_tsm_work *work)
 {
-    const size_t radii = (size_t)plan->radius_count + 1, classes = (size_t)plan->class_count;
-    double *const all = malloc((radii + classes + 2 * cosine_count) * sizeof *all);
-    *work = all ? (struct lut_tsm_work){ all, all + radii, all + radii + classes,
-                                         all + radii + classes + cosine_count }
-                : (struct lut_tsm_work){ 0 };
+    const size_t radii = (size_t)plan->radius_count + 1,
+                 means = IO_CHANNEL_COUNT * (size_t)plan->class_count, cosines = cosine_count + 1;
+    double *const all = malloc((radii + means + 2 * cosines) * sizeof *all);
+    *work =
+        all ? (struct lut_tsm_work){ all, all + radii, all + radii + means, all + radii + means + cosines }
+            : (struct lut_tsm_work){ 0 };
     return all != NULL;
 }
 
@@ -164,6 +225,7 @@ void lut_tsm_plan_destroy(struct lut_tsm_plan *plan)
     if (plan) {
         lut_profiles_end(plan->profiles);
         free(plan->r_mm);
+        free(plan->terms);
     }
     free(plan);
 }
@@ -216,15 +278,12 @@ static bool sources_find(struct lut_tsm_plan *plan, dipole_status *status)
 bool lut_tsm_plan_create(struct lut_tsm *lut, struct lut_tsm_plan **plan_out, dipole_status *status)
 {
     struct lut_tsm_plan *const plan = calloc(1, sizeof *plan);
-    double *const rules = malloc((size_t)2 * (LUT_TSM_SAMPLE_LIMIT * LUT_RULE_LIMIT + 1) * sizeof *rules);
+    const size_t terms = (size_t)LUT_TSM_SAMPLE_LIMIT * LUT_RULE_LIMIT;
     *plan_out = plan;
-    if (!plan || !rules) {
-        free(rules);
+    if (!plan || !(plan->r_mm = malloc((terms + 1) * sizeof *plan->r_mm)) ||
+        !(plan->terms = malloc(terms * sizeof *plan->terms)))
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume");
-    }
     plan->lut = lut;
-    plan->r_mm = rules;
-    plan->weight = rules + LUT_TSM_SAMPLE_LIMIT * LUT_RULE_LIMIT + 1;
     if (!lut_profiles_init(&lut->material, extent_epsilon, plan->profiles, status) ||
         !lut_profiles_check_range(plan->profiles, status))
         return false;
@@ -237,7 +296,7 @@ bool lut_tsm_plan_create(struct lut_tsm *lut, struct lut_tsm_plan **plan_out, di
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume");
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
         if (plan->profiles[c].stack)
-            plan->flat_inner_power[c] = lut_tsm_means_find(plan, c, 0, &work);
+            plan->flat_inner_power[c] = inner_power(plan, c, 0, &work);
     lut_tsm_work_end(&work);
     return true;
 }

@@ -76,20 +76,31 @@ static int split(double index, int count, double *fraction)
     return i;
 }
 
-void lut_tsm_sample(const struct lut_tsm *lut, int sample, double cosine, double dz_mm,
-                    double rgb_out[IO_CHANNEL_COUNT])
+void lut_tsm_sample_at(const struct lut_tsm *lut, int sample, double s, double t,
+                       double rgb_out[IO_CHANNEL_COUNT])
 {
     assert(sample >= 0 && sample < lut->sample_count);
     double fs, ft;
-    const int s = split(0.5 * (1 + cosine) * (lut->size[0] - 1), lut->size[0], &fs);
-    const int t = split(lut_tsm_depth_index(lut, dz_mm), lut->size[1], &ft);
+    const int i = split(s, lut->size[0], &fs), j = split(t, lut->size[1], &ft);
+    const float *const low = lut_tsm_texel(lut, i, j, sample), *const high =
+                                                                   lut_tsm_texel(lut, i, j + 1, sample);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        const double a = (1 - fs) * (double)lut_tsm_texel(lut, s, t, sample)[c] +
-                         fs * (double)lut_tsm_texel(lut, s + 1, t, sample)[c];
-        const double b = (1 - fs) * (double)lut_tsm_texel(lut, s, t + 1, sample)[c] +
-                         fs * (double)lut_tsm_texel(lut, s + 1, t + 1, sample)[c];
-        rgb_out[c] = fabs(dz_mm) <= lut->depth_max_mm ? ((1 - ft) * a + ft * b) * lut->scale[c] : 0;
+        const double a = (1 - fs) * (double)low[c] + fs * (double)low[IO_CHANNEL_COUNT + c];
+        const double b = (1 - fs) * (double)high[c] + fs * (double)high[IO_CHANNEL_COUNT + c];
+        rgb_out[c] = ((1 - ft) * a + ft * b) * lut->scale[c];
     }
+}
+
+void lut_tsm_sample(const struct lut_tsm *lut, int sample, double cosine, double dz_mm,
+                    double rgb_out[IO_CHANNEL_COUNT])
+{
+    if (fabs(dz_mm) <= lut->depth_max_mm) {
+        lut_tsm_sample_at(lut, sample, 0.5 * (1 + cosine) * (lut->size[0] - 1),
+                          lut_tsm_depth_index(lut, dz_mm), rgb_out);
+        return;
+    }
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        rgb_out[c] = 0;
 }
 
 void lut_tsm_local_kernel(const struct lut_tsm *lut, int i, int j, double rgb_out[IO_CHANNEL_COUNT])

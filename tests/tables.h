@@ -1,142 +1,152 @@
-/* lutgen's result, and its tables read back. */
+/* What the tests of lutgen's tables share: materials, and files that are wrong in one place. */
 #ifndef TABLES_H
 #define TABLES_H
 
-#include "tests/run_tool.h"
+#include "tests/check.h"
 
-#include "io/file.h"
-#include "lutgen/lut.h"
+#include "lutgen/internal.h"
 
-#include <jansson.h>
-#include <unistd.h>
+#include <stdlib.h>
+#include <string.h>
 
-/* lutgen --json with the arguments, which must succeed silently; returns "files". */
-static inline json_t *bake(struct tool_run *run, const char *const *arguments)
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static const char *const bundled[] = {
+    "apple",  "chicken1", "chicken2", "cream", "ketchup",    "marble",
+    "potato", "skimmilk", "skin1",    "skin2", "spectralon", "wholemilk"
+};
+enum { BUNDLED_COUNT = 12 };
+
+/* All lengths divided by factor. */
+static inline struct io_material read_bundled(const char *name, double factor)
 {
-    const char *all[128] = { "--json" };
-    for (size_t i = 0; arguments[i]; i++) {
-        assert_true(i + 2 < sizeof all / sizeof *all);
-        all[i + 1] = arguments[i];
+    char path[4096];
+    struct io_material material;
+    dipole_status status = { 0 };
+    snprintf(path, sizeof path, SOURCE_FOLDER "/materials/%s.json", name);
+    if (!io_material_read(path, &material, &status))
+        fail_msg("%s: %s", status.source, status.message);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        for (size_t i = 0; i < material.layer_count; i++) {
+            material.layers[c][i].medium.sigma_a_per_mm *= factor;
+            material.layers[c][i].medium.sigma_s_prime_per_mm *= factor;
+            material.layers[c][i].thickness_mm /= factor;
+        }
+    return material;
+}
+
+static inline struct io_material make_material(double sigma_a, double sigma_s_prime)
+{
+    struct io_material material = { .name = "made" };
+    const dipole_medium medium = { .sigma_a_per_mm = sigma_a,
+                                   .sigma_s_prime_per_mm = sigma_s_prime,
+                                   .eta = 1.3 };
+    io_material_set_media(&material, (const dipole_medium[]){ medium, medium, medium });
+    return material;
+}
+
+static inline dipole_stack *stack_of(const struct io_material *material, int channel)
+{
+    dipole_stack *stack = NULL;
+    dipole_status status = { 0 };
+    if (!dipole_stack_create(material->layers[channel], material->layer_count, material->model,
+                             DIPOLE_FROM_ABOVE, &stack, &status))
+        fail_msg("%s: %s", material->name, status.message);
+    return stack;
+}
+
+static inline dipole_coefficients coefficients_of(const struct io_material *material, int channel)
+{
+    dipole_coefficients c;
+    assert_true(dipole_coefficients_init(&material->layers[channel][0].medium, &c, NULL));
+    return c;
+}
+
+/* ---- files that are wrong in one place ------------------------------------------------------------ */
+
+/* Whether a table can be made of a picture from path. */
+typedef bool (*table_opener)(const struct io_image *image, const char *path, dipole_status *status);
+
+static inline struct io_image *read_image(const char *path)
+{
+    struct io_image *image = NULL;
+    dipole_status status = { 0 };
+    if (!io_exr_read(path, &image, &status))
+        fail_msg("%s", status.message);
+    return image;
+}
+
+static inline struct io_attribute *attribute_of(struct io_image *image, const char *name)
+{
+    for (size_t i = 0; i < image->attribute_count; i++)
+        if (strcmp(image->attributes[i].name, name) == 0)
+            return &image->attributes[i];
+    fail_msg("no %s", name);
+    return NULL;
+}
+
+static inline void assert_text(const struct io_image *image, const char *name, const char *text)
+{
+    const struct io_attribute *const attribute = io_image_find(image, name);
+    assert_non_null(attribute);
+    assert_string_equal(attribute->text, text);
+}
+
+/* message: part of what is said. */
+static inline void assert_refused(const struct io_image *image, table_opener open_table,
+                                  const char *message)
+{
+    dipole_status status = { 0 };
+    if (open_table(image, "bad.exr", &status))
+        fail_msg("opened, expected \"%s\"", message);
+    assert_true(status.code == DIPOLE_BAD_VALUE || status.code == DIPOLE_BAD_SYNTAX);
+    assert_string_equal(status.source, "bad.exr");
+    if (!strstr(status.message, message))
+        fail_msg("\"%s\" is not in \"%s\"", message, status.message);
+}
+
+/* Oracle: each change that is made. Every number of the picture's attributes in turn is another, every text
+ * has another letter or digit in each of some sixty places. */
+static inline void expect_changed_attributes_refused(struct io_image *image, table_opener open_table)
+{
+    for (size_t i = 0; i < image->attribute_count; i++) {
+        const struct io_attribute *const attribute = &image->attributes[i];
+        const int count = attribute->kind == IO_ATTRIBUTE_TEXT     ? 0
+                          : attribute->kind == IO_ATTRIBUTE_NUMBER ? 1
+                                                                   : 3;
+        for (int k = 0; k < count; k++) {
+            double *const number = &image->attributes[i].numbers[k], was = *number;
+            *number = was == 0 ? 1e-4 : was * 1.0001;
+            if (open_table(image, "bad.exr", NULL))
+                fail_msg("%s[%d] can be %.17g as well as %.17g", attribute->name, k, *number, was);
+            *number = was;
+        }
+        const size_t length = count == 0 ? strlen(attribute->text) : 0;
+        for (size_t k = 0; k < length; k += 1 + length / 60) {
+            char *const letter = &attribute->text[k], was = *letter;
+            if (!((was >= '0' && was <= '9') || (was >= 'a' && was <= 'z')))
+                continue;
+            *letter = was == '3' ? '4' : was == 'e' ? 'f' : was < 'a' ? '3' : 'e';
+            if (open_table(image, "bad.exr", NULL))
+                fail_msg("%s has another letter %zu, and that goes unseen: %s", attribute->name, k,
+                         attribute->text);
+            *letter = was;
+        }
     }
-    run_tool_limited(run, 0, "lutgen", all);
-    assert_done(run);
-    json_t *const result = json_loads(run->out, JSON_REJECT_DUPLICATES, NULL);
-    assert_non_null(result);
-    assert_int_equal(json_object_size(result), 1);
-    json_t *const files = json_incref(json_object_get(result, "files"));
-    assert_true(json_is_array(files));
-    json_decref(result);
-    return files;
 }
 
-#define BAKE(run, ...) bake(run, (const char *const[]){ __VA_ARGS__, NULL })
-
-static inline const char *file_text(const json_t *files, size_t i, const char *key)
+/* Oracle: what is missing. */
+static inline void expect_missing_attributes_named(struct io_image *image, table_opener open_table)
 {
-    const char *const text = json_string_value(json_object_get(json_array_get(files, i), key));
-    assert_non_null(text);
-    return text;
-}
-
-static inline double file_number(const json_t *files, size_t i, const char *key)
-{
-    const json_t *const number = json_object_get(json_array_get(files, i), key);
-    assert_true(json_is_number(number));
-    return json_number_value(number);
-}
-
-static inline bool file_is_current(const json_t *files, size_t i)
-{
-    const json_t *const value = json_object_get(json_array_get(files, i), "up_to_date");
-    assert_true(json_is_boolean(value));
-    return json_is_true(value);
-}
-
-/* A file of the result against the numbers of its table: their kind, size and errors. */
-static inline void expect_described(const json_t *files, size_t i, const char *kind, const char *size,
-                                    const struct lut_error *error)
-{
-    const json_t *const file = json_array_get(files, i);
-    assert_int_equal(json_object_size(file), 7);
-    assert_string_equal(file_text(files, i, "kind"), kind);
-    char *const found = json_dumps(json_object_get(file, "size"), JSON_COMPACT | JSON_ENCODE_ANY);
-    assert_string_equal(found, size);
-    free(found);
-    assert_true(file_number(files, i, "max_relative_error") == error->max);
-    assert_true(file_number(files, i, "p99_relative_error") == error->p99);
-    assert_true(error->p99 > 0 && error->p99 <= error->max);
-    assert_true(file_is_current(files, i) == (file_number(files, i, "bake_ms") == 0));
-}
-
-static inline struct lut_splat *splat_read(const char *path)
-{
-    struct lut_splat *lut;
-    dipole_status status;
-    if (!lut_splat_read(path, &lut, &status))
-        fail_msg("%s: %s", path, status.message);
-    return lut;
-}
-
-static inline struct lut_tsm *tsm_read(const char *path)
-{
-    struct lut_tsm *lut;
-    dipole_status status;
-    if (!lut_tsm_read(path, &lut, &status))
-        fail_msg("%s: %s", path, status.message);
-    return lut;
-}
-
-/* File i of the result, an EXR file, is what the result says, and errs by no more than it says at points
- * that neither the bake nor its check has seen. */
-static inline void audit_file(const json_t *files, size_t i, double epsilon)
-{
-    enum { SEED = 11, POINTS_PER_NODE = 40, DEPTHS = 100 };
-    const char *const path = file_text(files, i, "path"), *const kind = file_text(files, i, "kind");
-    struct lut_error found;
-    char size[64];
-    if (strcmp(kind, "tsm") == 0) {
-        struct lut_tsm *const lut = tsm_read(path);
-        snprintf(size, sizeof size, "[%d,%d,%d]", lut->size[0], lut->size[1], lut->size[2]);
-        expect_described(files, i, kind, size, &lut->error);
-        assert_true(lut->epsilon == epsilon && lut->error.max <= epsilon);
-        assert_true(lut_tsm_audit(lut, DEPTHS, SEED, &found, NULL));
-        if (!(found.max + lut->source_error <= lut->error.max))
-            fail_msg("%s errs by %g + %g, not %g", path, found.max, lut->source_error, lut->error.max);
-        lut_tsm_destroy(lut);
-        return;
+    for (size_t i = 0; i < image->attribute_count; i++) {
+        struct io_attribute *const attribute = &image->attributes[i];
+        char name[64], message[128];
+        snprintf(name, sizeof name, "%s", attribute->name);
+        snprintf(message, sizeof message, "no attribute %s, expected ", name);
+        snprintf(attribute->name, sizeof attribute->name, "dipole:other");
+        assert_refused(image, open_table, message);
+        snprintf(attribute->name, sizeof attribute->name, "%s", name);
     }
-    struct lut_splat *const lut = splat_read(path);
-    struct lut_error worst = { 0 };
-    for (size_t row = 0; row < lut->row_count; row++) {
-        const struct lut_error *const stated = &lut->rows[row].error;
-        worst = (struct lut_error){ fmax(worst.max, stated->max), fmax(worst.p99, stated->p99) };
-        assert_true(lut_splat_audit(lut, row, POINTS_PER_NODE, SEED, &found, NULL));
-        if (!(found.max <= stated->max))
-            fail_msg("%s, row %zu errs by %g, not %g", path, row, found.max, stated->max);
-    }
-    snprintf(size, sizeof size, strcmp(kind, "splat1d") == 0 ? "%d" : "[%d,%zu]", lut->node_count,
-             lut->row_count);
-    expect_described(files, i, kind, size, &worst);
-    assert_true(lut->epsilon == epsilon && worst.max <= epsilon);
-    lut_splat_destroy(lut);
-}
-
-static inline char *read_whole(const char *path, size_t *size)
-{
-    char *data = NULL;
-    if (!io_file_read(path, (size_t)1 << 28, &data, size, NULL))
-        fail_msg("%s cannot be read", path);
-    return data;
-}
-
-static inline bool has_same_bytes(const char *path, const char *other_path)
-{
-    size_t size, other_size;
-    char *const data = read_whole(path, &size), *const other = read_whole(other_path, &other_size);
-    const bool is_same = size == other_size && memcmp(data, other, size) == 0;
-    free(data);
-    free(other);
-    return is_same;
 }
 
 #endif

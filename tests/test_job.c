@@ -1,5 +1,5 @@
 /* lutgen a second time: what is there and right is left alone, everything else is baked anew. */
-#include "tests/tables.h"
+#include "tests/baked.h"
 
 #include <sys/stat.h>
 
