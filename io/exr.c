@@ -374,9 +374,10 @@ bool io_exr_write_checked(const char *path, const struct io_image *image, bool i
     const exr_result_t finished = exr_finish(&context);
     if (result == EXR_ERR_SUCCESS)
         result = finished;
-    const bool done = result == EXR_ERR_SUCCESS
-                          ? io_file_write_checked(path, stream.data, stream.size, check, check_context, status)
-                          : fail_at_exr(path, &stream, "cannot be written as EXR", result, status);
+    const bool done =
+        result == EXR_ERR_SUCCESS
+            ? io_file_write_checked(path, stream.data, stream.size, check, check_context, status)
+            : fail_at_exr(path, &stream, "cannot be written as EXR", result, status);
     free(stream.data);
     return done;
 }

@@ -1,5 +1,5 @@
-#include "tests/svg_check.h"
 #include "tests/baked.h"
+#include "tests/svg_check.h"
 
 #include "io/half.h"
 #include "lutgen/internal.h"
