@@ -13,7 +13,9 @@ enum { RADIUS_COUNT = 4096, ROW_LIMIT = 16, ROUND_COUNT = 41 };
 static double radii_mm[RADIUS_COUNT], values[RADIUS_COUNT], d_sigma_a[RADIUS_COUNT],
     d_sigma_s_prime[RADIUS_COUNT];
 static dipole_coefficients coefficients;
-static dipole_stack *half_space, *layers;
+static double cosines[RADIUS_COUNT];
+static dipole_stack *dipole, *half_space, *layers;
+static dipole_sources two_sources, fitted_sources;
 
 /* ---- one radius a call ---------------------------------------------------------------------------- */
 
@@ -106,6 +108,27 @@ static void all_layers(size_t count)
     dipole_stack_profile_per_mm2(layers, DIPOLE_FACE_LIT, radii_mm, count, values);
 }
 
+static void all_two_sources(size_t count)
+{
+    dipole_sources_profile_per_mm2(&two_sources, 5.0, cosines, count, values);
+}
+
+static void in_calls_of_64(size_t count)
+{
+    for (size_t i = 0; i < count; i += 64)
+        dipole_sources_profile_per_mm2(&two_sources, 5.0, cosines + i, 64, values + i);
+}
+
+static void all_fitted_sources(size_t count)
+{
+    dipole_sources_profile_per_mm2(&fitted_sources, 5.0, cosines, count, values);
+}
+
+static void all_discs_of_two(size_t count)
+{
+    dipole_sources_within_many(&two_sources, -0.2, radii_mm, count, values);
+}
+
 /* ---- the tables ----------------------------------------------------------------------------------- */
 
 struct row {
@@ -162,11 +185,16 @@ static void print_table(const char *heading, const struct row *rows, size_t row_
 
 int main(void)
 {
+    static char fitted_name[64];
     static const struct row batches[] = {
         { "two exp(), vector code of the C library", NULL, all_bare_exp, RADIUS_COUNT },
         { "Rd(r) as a loop over its formula, scalar exp()", NULL, all_formula, RADIUS_COUNT },
         { "`dipole_rd_profile_per_mm2`", NULL, all_profile, RADIUS_COUNT },
         { "`dipole_rd_profile_gradient`: Rd and two derivatives", NULL, all_gradients, RADIUS_COUNT },
+        { "`dipole_sources_profile_per_mm2`: the dipole's two", NULL, all_two_sources, RADIUS_COUNT },
+        { "the same in calls of 64", NULL, in_calls_of_64, RADIUS_COUNT },
+        { fitted_name, NULL, all_fitted_sources, RADIUS_COUNT },
+        { "`dipole_sources_within_many`: the dipole's two", NULL, all_discs_of_two, RADIUS_COUNT },
         { "`dipole_stack_profile_per_mm2`: beam model, half-space", NULL, all_beam, 256 },
         { "the same: beam model, two layers", NULL, all_layers, 256 },
     };
@@ -187,12 +215,20 @@ int main(void)
                                     { { 0.0021, 2.19, 1.5, DIPOLE_FDR_EXACT }, INFINITY } };
     if (!dipole_coefficients_init(&marble_green, &coefficients, NULL) ||
         !dipole_stack_create(stack + 1, 1, DIPOLE_MODEL_BEAM, DIPOLE_FROM_ABOVE, &half_space, NULL) ||
-        !dipole_stack_create(stack, 2, DIPOLE_MODEL_BEAM, DIPOLE_FROM_ABOVE, &layers, NULL))
+        !dipole_stack_create(stack, 2, DIPOLE_MODEL_BEAM, DIPOLE_FROM_ABOVE, &layers, NULL) ||
+        !dipole_stack_create(stack + 1, 1, DIPOLE_MODEL_DIPOLE, DIPOLE_FROM_ABOVE, &dipole, NULL) ||
+        !dipole_sources_init(dipole, 0.01, 0.1, 20.0, &two_sources, NULL) ||
+        !dipole_sources_init(layers, 0.01, 0.1, 20.0, &fitted_sources, NULL))
         return EXIT_FAILED;
-    for (int i = 0; i < RADIUS_COUNT; i++)
+    for (int i = 0; i < RADIUS_COUNT; i++) {
         radii_mm[i] = 20.0 * i / RADIUS_COUNT;
+        cosines[i] = 2.0 * i / RADIUS_COUNT - 1.0;
+    }
+    snprintf(fitted_name, sizeof fitted_name, "the same: beam model, two layers, %zu fitted sources",
+             fitted_sources.count);
     print_table("one of many radii in a call", batches, COUNT(batches));
     print_table("one call of", calls, COUNT(calls));
+    dipole_stack_destroy(dipole);
     dipole_stack_destroy(half_space);
     dipole_stack_destroy(layers);
     return EXIT_DONE;

@@ -1,5 +1,7 @@
 #include "cli/cli.h"
 
+#include "io/file.h"
+
 #include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
@@ -265,22 +267,53 @@ static bool store_integers(const struct cli_option *row, const char *text, char 
     return true;
 }
 
-static bool store_choice(const struct table *table, const struct cli_option *row, const char *text)
+/* Say what the choices are; false. */
+static bool print_choices(const struct table *table, const struct cli_option *row, const char *text)
 {
     char expected[512] = "";
     size_t length = 0;
     for (int i = 0; row->choices[i]; i++) {
-        if (strcmp(text, row->choices[i]) == 0) {
-            *(int *)row->target = i;
-            return true;
-        }
         const int count = snprintf(expected + length, sizeof expected - length, "%s%s", i > 0 ? ", " : "",
                                    row->choices[i]);
         if (count > 0 && length + (size_t)count < sizeof expected)
             length += (size_t)count;
     }
-    print_usage_error(table, "--%s is \"%.100s\", expected one of %s", row->name, text, expected);
+    print_usage_error(table, "--%s is \"%.100s\", expected one of %s%s", row->name, text, expected,
+                      row->kind == CLI_CHOICES ? ", or several with commas between" : "");
     return false;
+}
+
+static bool store_choice(const struct table *table, const struct cli_option *row, const char *text)
+{
+    for (int i = 0; row->choices[i]; i++)
+        if (strcmp(text, row->choices[i]) == 0) {
+            *(int *)row->target = i;
+            return true;
+        }
+    return print_choices(table, row, text);
+}
+
+static bool store_choices(const struct table *table, const struct cli_option *row, const char *text)
+{
+    unsigned chosen = 0;
+    for (const char *p = text;; p++) {
+        const size_t length = strcspn(p, ",");
+        int i = 0;
+        while (row->choices[i] &&
+               (strlen(row->choices[i]) != length || strncmp(row->choices[i], p, length) != 0))
+            i++;
+        if (!row->choices[i]) {
+            char name[101];
+            snprintf(name, sizeof name, "%.*s", (int)(length < 100 ? length : 100), p);
+            return print_choices(table, row, name);
+        }
+        chosen |= 1U << i;
+        p += length;
+        if (*p == '\0')
+            break;
+    }
+    *(unsigned *)row->target = chosen;
+    return true;
 }
 
 static bool store_numbers(const struct table *table, const struct cli_option *row, const char *text)
@@ -332,6 +365,8 @@ static bool store(const struct table *table, const struct cli_option *row, const
         return false;
     case CLI_CHOICE:
         return store_choice(table, row, text);
+    case CLI_CHOICES:
+        return store_choices(table, row, text);
     case CLI_SIZE:
         if (store_integers(row, text, 'x', true, row->target))
             return true;
@@ -498,10 +533,39 @@ bool cli_stdout_finish(dipole_status *status)
                        reason ? reason : "some of the output was lost");
 }
 
+/*
+ * Leave no half-written file, then end as the signal would have ended the program without us. On the main
+ * thread, which writes the files: one that it is about to make is then not made any more.
+ */
+static void end_by_signal(int number)
+{
+    if (gettid() != getpid()) {
+        tgkill(getpid(), getpid(), number);
+        return;
+    }
+    io_file_remove_temporaries();
+    signal(number, SIG_DFL);
+    sigset_t numbers;
+    sigemptyset(&numbers);
+    sigaddset(&numbers, number);
+    sigprocmask(SIG_UNBLOCK, &numbers, NULL);
+    raise(number);
+}
+
 void cli_start(void)
 {
+    static const int numbers[] = { SIGHUP, SIGINT, SIGTERM };
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action = { 0 };
+        /* One that is ignored stays so: nohup, and what a script starts in the background. */
+        if (sigaction(numbers[i], NULL, &action) != 0 || action.sa_handler == SIG_IGN)
+            continue;
+        action = (struct sigaction){ .sa_handler = end_by_signal, .sa_flags = SA_RESTART };
+        sigfillset(&action.sa_mask); /* one of them at a time */
+        sigaction(numbers[i], &action, NULL);
+    }
 }
 
 /* ---- progress ------------------------------------------------------------------------------------- */

@@ -18,6 +18,7 @@ enum cli_kind {
     CLI_TEXT,     /* target: const char **                                         */
     CLI_NUMBER,   /* target: double *, min..max                                    */
     CLI_CHOICE,   /* target: int *, index into choices                             */
+    CLI_CHOICES,  /* target: unsigned *, comma separated, bit i for choices[i]     */
     CLI_SIZE,     /* target: int[2], WxH, each min..max                            */
     CLI_RANGE,    /* target: int[2], A:B or A, each min..max, A <= B               */
     CLI_NUMBERS,  /* target: struct cli_numbers *, comma separated, each min..max  */
@@ -95,7 +96,11 @@ bool cli_stdout_finish(dipole_status *status);
 /* Monotonic clock. */
 double cli_now_s(void);
 
-/* Ignore SIGXFSZ and SIGPIPE, so that a full disk or a closed pipe is an error code; call first. */
+/*
+ * Call first. SIGXFSZ and SIGPIPE are ignored, so that a full disk or a closed pipe is an error code.
+ * SIGHUP, SIGINT and SIGTERM still end the program, whose status says so, but remove the temporary files of
+ * io_file_write() before; where they were ignored they still are.
+ */
 void cli_start(void);
 
 #endif

@@ -1,9 +1,9 @@
 #include "io/exr.h"
 
 #include "io/file.h"
+#include "io/half.h"
 
 #include <assert.h>
-#include <math.h>
 #include <openexr.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -33,7 +33,7 @@ bool io_image_create(int width_px, int height_px, int channel_count, struct io_i
     if (channel_count != 1 && channel_count != 3 && channel_count != 4)
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "image of %d channels, expected 1, 3 or 4",
                            channel_count);
-    /* One allocation: the pixels follow the struct, whose size is a multiple of a float's. */
+    /* The pixels follow the struct, whose size is a multiple of a float's. */
     struct io_image *image = calloc(1, sizeof *image + pixel_count * (size_t)channel_count * sizeof(float));
     if (!image)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for an image of %d x %d pixels",
@@ -48,80 +48,85 @@ bool io_image_create(int width_px, int height_px, int channel_count, struct io_i
 
 void io_image_destroy(struct io_image *image)
 {
+    if (!image)
+        return;
+    for (size_t i = 0; i < image->attribute_count; i++) {
+        assert(image->attributes);
+        free(image->attributes[i].text);
+    }
+    free(image->attributes);
     free(image);
 }
 
-static struct io_attribute *add_attribute(struct io_image *image, const char *name,
-                                          enum io_attribute_kind kind)
+static size_t attribute_index(const struct io_image *image, const char *name)
 {
-    if (image->attribute_count == IO_EXR_MAX_ATTRIBUTES)
-        return NULL;
-    struct io_attribute *attribute = &image->attributes[image->attribute_count++];
-    *attribute = (struct io_attribute){ .kind = kind };
-    snprintf(attribute->name, sizeof attribute->name, "%s", name);
-    return attribute;
+    size_t i = 0;
+    while (i < image->attribute_count && strcmp(image->attributes[i].name, name) != 0)
+        i++;
+    return i;
+}
+
+/* Room for one attribute more. */
+static bool grow_attributes(struct io_image *image)
+{
+    if (image->attribute_count < image->attribute_capacity)
+        return true;
+    if (image->attribute_count == IO_IMAGE_MAX_ATTRIBUTES)
+        return false;
+    const size_t capacity = image->attribute_capacity ? 2 * image->attribute_capacity : 16;
+    struct io_attribute *attributes = realloc(image->attributes, capacity * sizeof *attributes);
+    if (!attributes)
+        return false;
+    image->attributes = attributes;
+    image->attribute_capacity = capacity;
+    return true;
+}
+
+/* Put an attribute in the place of the one of its name, or behind the last. What is not taken is freed. */
+static bool set_attribute(struct io_image *image, const char *name, struct io_attribute attribute)
+{
+    const size_t i = attribute_index(image, name), length = strlen(name);
+    if (length >= sizeof attribute.name || (i == image->attribute_count && !grow_attributes(image))) {
+        free(attribute.text);
+        return false;
+    }
+    assert(image->attributes);
+    memcpy(attribute.name, name, length + 1);
+    if (i == image->attribute_count)
+        image->attribute_count++;
+    else
+        free(image->attributes[i].text);
+    image->attributes[i] = attribute;
+    return true;
 }
 
 bool io_image_set_text(struct io_image *image, const char *name, const char *text)
 {
-    struct io_attribute *attribute = add_attribute(image, name, IO_ATTRIBUTE_TEXT);
-    if (attribute)
-        snprintf(attribute->text, sizeof attribute->text, "%s", text);
-    return attribute != NULL;
+    const size_t length = strlen(text);
+    char *copy = length <= IO_IMAGE_TEXT_LIMIT ? malloc(length + 1) : NULL;
+    if (!copy)
+        return false;
+    memcpy(copy, text, length + 1);
+    return set_attribute(image, name, (struct io_attribute){ .kind = IO_ATTRIBUTE_TEXT, .text = copy });
 }
 
 bool io_image_set_number(struct io_image *image, const char *name, double value)
 {
-    struct io_attribute *attribute = add_attribute(image, name, IO_ATTRIBUTE_NUMBER);
-    if (attribute)
-        attribute->numbers[0] = value;
-    return attribute != NULL;
+    return set_attribute(image, name,
+                         (struct io_attribute){ .kind = IO_ATTRIBUTE_NUMBER, .numbers = { value } });
 }
 
 bool io_image_set_numbers(struct io_image *image, const char *name, const double values[3])
 {
-    struct io_attribute *attribute = add_attribute(image, name, IO_ATTRIBUTE_NUMBERS);
-    if (attribute)
-        memcpy(attribute->numbers, values, sizeof attribute->numbers);
-    return attribute != NULL;
+    const struct io_attribute attribute = { .kind = IO_ATTRIBUTE_NUMBERS,
+                                            .numbers = { values[0], values[1], values[2] } };
+    return set_attribute(image, name, attribute);
 }
 
 const struct io_attribute *io_image_find(const struct io_image *image, const char *name)
 {
-    for (size_t i = 0; i < image->attribute_count; i++)
-        if (strcmp(image->attributes[i].name, name) == 0)
-            return &image->attributes[i];
-    return NULL;
-}
-
-/* ---- half floats ---------------------------------------------------------------------------------- */
-
-/* Nearest half, ties to even; what rounds beyond 65504 becomes infinity. */
-static uint16_t half_from_float(float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    const uint16_t sign = (uint16_t)(bits >> 16 & 0x8000u);
-    const uint32_t magnitude = bits & 0x7fffffffu;
-    if (magnitude > 0x7f800000u)
-        return sign | 0x7e00u; /* NaN */
-    if (magnitude >= 0x47800000u)
-        return sign | 0x7c00u;   /* 65536 and more */
-    if (magnitude < 0x38800000u) /* below 2^-14 a half counts in units of 2^-24; rintf rounds to even */
-        return sign | (uint16_t)rintf(fabsf(value) * 0x1p24f);
-    const uint32_t odd = magnitude >> 13 & 1u;
-    return sign | (uint16_t)((magnitude - 0x38000000u + 0xfffu + odd) >> 13);
-}
-
-static float float_from_half(uint16_t half)
-{
-    const bool is_finite = (half & 0x7c00u) != 0x7c00u;
-    const uint32_t bits = (half & 0x7fffu) << 13 | (is_finite ? 0u : 0x7f800000u);
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    if (is_finite) /* exponents of half and float differ by 112 */
-        value *= 0x1p112f;
-    return half & 0x8000u ? -value : value;
+    const size_t i = attribute_index(image, name);
+    return i < image->attribute_count ? &image->attributes[i] : NULL;
 }
 
 /* ---- the library's streams and errors ------------------------------------------------------------- */
@@ -130,6 +135,7 @@ static float float_from_half(uint16_t half)
 struct stream {
     char *data;
     size_t size, capacity;
+    bool is_out_of_memory;
     char error[160];
 };
 
@@ -142,6 +148,13 @@ static void keep_error(exr_const_context_t context, exr_result_t code, const cha
     struct stream *stream = user_data;
     if (!stream->error[0])
         snprintf(stream->error, sizeof stream->error, "%s", message);
+}
+
+/* While it writes, the library reports errors with its context locked, and asking for the stream would wait
+ * for ever; the code that it returns has to do. */
+static void ignore_error(exr_const_context_t context, exr_result_t code, const char *message)
+{
+    (void)context, (void)code, (void)message;
 }
 
 static int64_t read_stream(exr_const_context_t context, void *user_data, void *buffer, uint64_t size,
@@ -166,13 +179,14 @@ static int64_t stream_size(exr_const_context_t context, void *user_data)
 static int64_t write_stream(exr_const_context_t context, void *user_data, const void *buffer, uint64_t size,
                             uint64_t offset, exr_stream_error_func_ptr_t fail)
 {
+    (void)context, (void)fail;
     struct stream *stream = user_data;
     const size_t end = (size_t)offset + (size_t)size;
     if (end > stream->capacity) {
         const size_t capacity = end > 2 * stream->capacity ? end : 2 * stream->capacity;
         char *data = realloc(stream->data, capacity);
         if (!data) {
-            fail(context, EXR_ERR_OUT_OF_MEMORY, "no memory for %zu bytes", capacity);
+            stream->is_out_of_memory = true;
             return -1;
         }
         memset(data + stream->capacity, 0, capacity - stream->capacity);
@@ -189,6 +203,8 @@ static bool fail_at_exr(const char *path, const struct stream *stream, const cha
                         dipole_status *status)
 {
     const dipole_place place = { .source = path };
+    if (stream->is_out_of_memory)
+        code = EXR_ERR_OUT_OF_MEMORY;
     return dipole_fail(status, code == EXR_ERR_OUT_OF_MEMORY ? DIPOLE_OUT_OF_MEMORY : DIPOLE_BAD_SYNTAX,
                        &place, "%s: %s", what,
                        stream->error[0] ? stream->error : exr_get_default_error_message(code));
@@ -249,7 +265,7 @@ static void pack_channel(const struct io_image *image, int channel, int row, int
     const size_t count = (size_t)row_count * (size_t)image->width_px;
     const float *in = image->pixels + (size_t)row * (size_t)image->width_px * step + (size_t)channel;
     for (size_t i = 0; i < count; i++) {
-        const uint16_t half = half_from_float(in[i * step]);
+        const uint16_t half = io_half_from_float(in[i * step]);
         if (is_half)
             memcpy(out + i * sizeof half, &half, sizeof half);
         else
@@ -265,9 +281,27 @@ static int channel_index(const struct io_image *image, const char *name)
     return c;
 }
 
-static exr_result_t write_chunk(exr_context_t context, const struct io_image *image, int row, bool is_half,
-                                bool is_first, uint8_t *rows, exr_encode_pipeline_t *pipeline)
+/* The library's compressor. */
+struct compression {
+    exr_result_t (*run)(exr_encode_pipeline_t *pipeline);
+};
+
+/* A chunk whose size compression does not change is read as one that is not compressed, yet up to
+ * version 3.4.7 the library writes it compressed (OpenEXR issue 2306). */
+static exr_result_t compress(exr_encode_pipeline_t *pipeline)
 {
+    const struct compression *compression = pipeline->encoding_user_data;
+    const exr_result_t result = compression->run(pipeline);
+    if (result == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes)
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    return result;
+}
+
+static exr_result_t write_chunk(exr_context_t context, const struct io_image *image, int row, bool is_half,
+                                struct compression *compression, uint8_t *rows,
+                                exr_encode_pipeline_t *pipeline)
+{
+    const bool is_first = row == 0;
     const int16_t value_size = is_half ? 2 : 4;
     exr_chunk_info_t chunk;
     exr_result_t result = exr_write_scanline_chunk_info(context, 0, row, &chunk);
@@ -288,8 +322,12 @@ static exr_result_t write_chunk(exr_context_t context, const struct io_image *im
         channel->user_line_stride = value_size * image->width_px;
         channel->encode_from_ptr = plane;
     }
-    if (is_first)
+    if (is_first) {
         result = exr_encoding_choose_default_routines(context, 0, pipeline);
+        compression->run = pipeline->compress_fn;
+        pipeline->compress_fn = compress;
+        pipeline->encoding_user_data = compression;
+    }
     return result == EXR_ERR_SUCCESS ? exr_encoding_run(context, 0, pipeline) : result;
 }
 
@@ -302,38 +340,28 @@ static exr_result_t write_chunks(exr_context_t context, const struct io_image *i
     uint8_t *rows = malloc((size_t)rows_per_chunk * (size_t)image->width_px * (size_t)image->channel_count *
                            MAX_VALUE_SIZE);
     exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    struct compression compression;
     exr_result_t result = rows ? EXR_ERR_SUCCESS : EXR_ERR_OUT_OF_MEMORY;
     for (int row = 0; row < image->height_px && result == EXR_ERR_SUCCESS; row += rows_per_chunk)
-        result = write_chunk(context, image, row, is_half, row == 0, rows, &pipeline);
+        result = write_chunk(context, image, row, is_half, &compression, rows, &pipeline);
     exr_encoding_destroy(context, &pipeline);
     free(rows);
     return result;
 }
 
-static bool check_half_range(const char *path, const struct io_image *image, dipole_status *status)
-{
-    const size_t count = (size_t)image->width_px * (size_t)image->height_px * (size_t)image->channel_count;
-    for (size_t i = 0; i < count; i++) {
-        if (!isfinite(image->pixels[i]) || (half_from_float(image->pixels[i]) & 0x7fffu) < 0x7c00u)
-            continue;
-        const size_t pixel = i / (size_t)image->channel_count, width = (size_t)image->width_px;
-        const dipole_place place = { .source = path };
-        return dipole_fail(status, DIPOLE_BAD_VALUE, &place,
-                           "pixel (%zu, %zu) of channel %s is %g, expected at most 65504 in half",
-                           pixel % width, pixel / width,
-                           channel_name(image, (int)(i % (size_t)image->channel_count)),
-                           (double)image->pixels[i]);
-    }
-    return true;
-}
-
 bool io_exr_write(const char *path, const struct io_image *image, bool is_half, dipole_status *status)
 {
-    if (is_half && !check_half_range(path, image, status))
+    return io_exr_write_checked(path, image, is_half, NULL, NULL, status);
+}
+
+bool io_exr_write_checked(const char *path, const struct io_image *image, bool is_half,
+                          io_file_check *check, void *check_context, dipole_status *status)
+{
+    if (is_half && !io_half_check(path, image, status))
         return false;
     struct stream stream = { 0 };
     exr_context_initializer_t initializer = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    initializer.error_handler_fn = keep_error;
+    initializer.error_handler_fn = ignore_error;
     initializer.user_data = &stream;
     initializer.write_fn = write_stream;
 
@@ -346,9 +374,10 @@ bool io_exr_write(const char *path, const struct io_image *image, bool is_half, 
     const exr_result_t finished = exr_finish(&context);
     if (result == EXR_ERR_SUCCESS)
         result = finished;
-    const bool done = result == EXR_ERR_SUCCESS
-                          ? io_file_write(path, stream.data, stream.size, status)
-                          : fail_at_exr(path, &stream, "cannot be written as EXR", result, status);
+    const bool done =
+        result == EXR_ERR_SUCCESS
+            ? io_file_write_checked(path, stream.data, stream.size, check, check_context, status)
+            : fail_at_exr(path, &stream, "cannot be written as EXR", result, status);
     free(stream.data);
     return done;
 }
@@ -409,25 +438,38 @@ static bool choose_channels(struct source *source, dipole_status *status)
     return true;
 }
 
-static void keep_attributes(struct source *source)
+static bool keep_attribute(struct source *source, const exr_attribute_t *a, dipole_status *status)
+{
+    struct io_image *const image = source->image;
+    const dipole_place place = { .source = source->path };
+    const size_t length = a->type == EXR_ATTR_STRING ? strlen(a->string->str) : 0;
+    if (strlen(a->name) >= sizeof image->attributes->name || length > IO_IMAGE_TEXT_LIMIT ||
+        image->attribute_count == IO_IMAGE_MAX_ATTRIBUTES)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, &place,
+                           "attribute %.64s is too much, expected at most %d of at most %d bytes", a->name,
+                           IO_IMAGE_MAX_ATTRIBUTES, IO_IMAGE_TEXT_LIMIT);
+    const bool is_kept =
+        a->type == EXR_ATTR_STRING ? io_image_set_text(image, a->name, a->string->str)
+        : a->type == EXR_ATTR_DOUBLE
+            ? io_image_set_number(image, a->name, a->d)
+            : io_image_set_numbers(image, a->name, (double[]){ a->v3d->x, a->v3d->y, a->v3d->z });
+    return is_kept || dipole_fail(status, DIPOLE_OUT_OF_MEMORY, &place, "no memory for its attributes");
+}
+
+static bool keep_attributes(struct source *source, dipole_status *status)
 {
     int32_t count = 0;
-    if (exr_get_attribute_count(source->context, 0, &count) != EXR_ERR_SUCCESS)
-        return;
-    for (int32_t i = 0; i < count; i++) {
+    exr_result_t result = exr_get_attribute_count(source->context, 0, &count);
+    for (int32_t i = 0; i < count && result == EXR_ERR_SUCCESS; i++) {
         const exr_attribute_t *a;
-        if (exr_get_attribute_by_index(source->context, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a) !=
-                EXR_ERR_SUCCESS ||
-            strncmp(a->name, "dipole:", 7) != 0)
+        result = exr_get_attribute_by_index(source->context, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a);
+        if (result != EXR_ERR_SUCCESS || strncmp(a->name, "dipole:", 7) != 0)
             continue;
-        if (a->type == EXR_ATTR_STRING)
-            (void)io_image_set_text(source->image, a->name, a->string->str);
-        else if (a->type == EXR_ATTR_DOUBLE)
-            (void)io_image_set_number(source->image, a->name, a->d);
-        else if (a->type == EXR_ATTR_V3D)
-            (void)io_image_set_numbers(source->image, a->name,
-                                       (double[]){ a->v3d->x, a->v3d->y, a->v3d->z });
+        if ((a->type == EXR_ATTR_STRING || a->type == EXR_ATTR_DOUBLE || a->type == EXR_ATTR_V3D) &&
+            !keep_attribute(source, a, status))
+            return false;
     }
+    return result == EXR_ERR_SUCCESS || fail_at_source(source, result, status);
 }
 
 static bool check_part(struct source *source, exr_storage_t *storage_out, dipole_status *status)
@@ -472,7 +514,7 @@ static void unpack_channel(const struct source *source, int channel, const uint8
             uint32_t whole;
             if (type == EXR_PIXEL_HALF) {
                 memcpy(&half, in, sizeof half);
-                *out = float_from_half(half);
+                *out = io_float_from_half(half);
                 in += sizeof half;
             } else {
                 memcpy(type == EXR_PIXEL_FLOAT ? (void *)out : (void *)&whole, in, sizeof whole);
@@ -586,8 +628,7 @@ static bool read_context(struct source *source, dipole_status *status)
         return false;
     assert(image);
     source->image = image;
-    keep_attributes(source);
-    return read_pixels(source, storage, status);
+    return keep_attributes(source, status) && read_pixels(source, storage, status);
 }
 
 bool io_exr_read(const char *path, struct io_image **image_out, dipole_status *status)

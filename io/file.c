@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -126,50 +127,122 @@ static bool write_to_device(const char *path, const void *data, size_t size, dip
     return done || fail_at_path(status, path, "cannot be written", error);
 }
 
-/* Create a file of a name that no other process or thread uses. */
-static int create_temporary(const char *folder, char temporary[PATH_MAX])
+/*
+ * Temporary files that may exist now. A place is claimed, its path filled in, and only then is it in use:
+ * what a signal handler sees in use is whole. Fixed, since a handler can neither lock nor allocate; a
+ * writer that finds all places taken writes all the same, and leaves its file behind when a signal ends it.
+ */
+enum { PLACE_COUNT = 16, PLACE_FREE = 0, PLACE_CLAIMED, PLACE_IN_USE };
+static struct {
+    atomic_int state;
+    char path[PATH_MAX];
+} temporaries[PLACE_COUNT];
+
+/* Index of a free place, now claimed, or -1. */
+static int place_claim(void)
 {
-    static atomic_uint counter;
-    for (int attempt = 0; attempt < 100; attempt++) {
-        const int length = snprintf(temporary, PATH_MAX, "%s/.dipole-%ld-%u.tmp", folder, (long)getpid(),
-                                    atomic_fetch_add(&counter, 1));
-        if (length < 0 || length >= PATH_MAX) {
-            errno = ENAMETOOLONG;
-            return -1;
-        }
-        const int file = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (file >= 0 || errno != EEXIST)
-            return file;
+    for (int i = 0; i < PLACE_COUNT; i++) {
+        int expected = PLACE_FREE;
+        if (atomic_compare_exchange_strong(&temporaries[i].state, &expected, PLACE_CLAIMED))
+            return i;
     }
     return -1;
 }
 
+static void place_set(int place, int state)
+{
+    if (place >= 0)
+        atomic_store(&temporaries[place].state, state);
+}
+
+void io_file_remove_temporaries(void)
+{
+    const int error = errno;
+    for (int i = 0; i < PLACE_COUNT; i++)
+        if (atomic_load(&temporaries[i].state) == PLACE_IN_USE)
+            unlink(temporaries[i].path);
+    errno = error;
+}
+
+/*
+ * Create a file whose name no other process or thread uses, on this machine or another one that shares the
+ * folder: a handler may remove it before it exists, so it must be nobody else's. place (or -1) is in use
+ * when the file exists.
+ */
+static int create_temporary(const char *folder, int place, char temporary[PATH_MAX])
+{
+    for (int attempt = 0; attempt < 100; attempt++) {
+        unsigned long long word;
+        if (getrandom(&word, sizeof word, 0) != (ssize_t)sizeof word)
+            return -1;
+        const int length =
+            snprintf(temporary, PATH_MAX, "%s/.dipole-%ld-%016llx.tmp", folder, (long)getpid(), word);
+        if (length < 0 || length >= PATH_MAX) {
+            errno = ENAMETOOLONG;
+            return -1;
+        }
+        if (place >= 0)
+            memcpy(temporaries[place].path, temporary, (size_t)length + 1);
+        place_set(place, PLACE_IN_USE);
+        const int file = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (file >= 0 || errno != EEXIST)
+            return file;
+        place_set(place, PLACE_CLAIMED);
+    }
+    return -1;
+}
+
+/* Bytes on disk before the file is closed; errno says why not. */
+static bool fill_and_close(int file, const void *data, size_t size)
+{
+    const bool is_full = write_all(file, data, size) && fsync(file) == 0;
+    const int error = errno;
+    const bool is_closed = close(file) == 0;
+    if (!is_full)
+        errno = error;
+    return is_full && is_closed;
+}
+
+/* Write under a temporary name, check, and rename. */
+static bool write_and_rename(const char *path, const char *folder, int place, const void *data, size_t size,
+                             io_file_check *check, void *context, dipole_status *status)
+{
+    char temporary[PATH_MAX];
+    const int file = create_temporary(folder, place, temporary);
+    if (file < 0)
+        return fail_at_path(status, path, "cannot be written", errno);
+    bool done = fill_and_close(file, data, size) || fail_at_path(status, path, "cannot be written", errno);
+    if (done && check && !check(context, temporary, status)) {
+        done = false;
+        if (status && strncmp(status->source, temporary, sizeof status->source - 1) ==
+                          0) /* a name that nobody has heard of */
+            snprintf(status->source, sizeof status->source, "%s", path);
+    }
+    done = done && (rename(temporary, path) == 0 || fail_at_path(status, path, "cannot be written", errno));
+    if (!done)
+        unlink(temporary);
+    return done;
+}
+
 bool io_file_write(const char *path, const void *data, size_t size, dipole_status *status)
+{
+    return io_file_write_checked(path, data, size, NULL, NULL, status);
+}
+
+bool io_file_write_checked(const char *path, const void *data, size_t size, io_file_check *check,
+                           void *context, dipole_status *status)
 {
     struct stat info;
     if (stat(path, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode))
         return write_to_device(path, data, size, status);
 
-    char folder[PATH_MAX], temporary[PATH_MAX];
+    char folder[PATH_MAX];
     if (!folder_of(path, folder))
         return fail_at_path(status, path, "cannot be written", ENAMETOOLONG);
-    const int file = create_temporary(folder, temporary);
-    if (file < 0)
-        return fail_at_path(status, path, "cannot be written", errno);
-    bool done = write_all(file, data, size) && fsync(file) == 0;
-    int error = errno;
-    if (close(file) != 0 && done) {
-        done = false;
-        error = errno;
-    }
-    if (done && rename(temporary, path) != 0) {
-        done = false;
-        error = errno;
-    }
-    if (done)
-        return true;
-    unlink(temporary);
-    return fail_at_path(status, path, "cannot be written", error);
+    const int place = place_claim();
+    const bool done = write_and_rename(path, folder, place, data, size, check, context, status);
+    place_set(place, PLACE_FREE);
+    return done;
 }
 
 bool io_file_check_writable(const char *path, dipole_status *status)

@@ -20,6 +20,19 @@ DIPOLE_CHECKED bool io_file_read(const char *path, size_t limit_bytes, char **da
  * the temporary file is gone; status names path and the system's reason. */
 DIPOLE_CHECKED bool io_file_write(const char *path, const void *data, size_t size, dipole_status *status);
 
+/* Looks at a file that is complete but has not got its name yet; false, with *status, refuses it. */
+typedef bool io_file_check(void *context, const char *path, dipole_status *status);
+
+/* The same, but the file only gets its name when check (may be NULL) has passed what is on disk. */
+DIPOLE_CHECKED bool io_file_write_checked(const char *path, const void *data, size_t size,
+                                          io_file_check *check, void *context, dipole_status *status);
+
+/*
+ * Remove the temporary files of every io_file_write() under way in this process, which then fails. For the
+ * handler of a signal that ends the process: async-signal-safe, changes no errno. cli_start() installs one.
+ */
+void io_file_remove_temporaries(void);
+
 /* Fails unless path's folder exists and is writable: to refuse before long work, not after. */
 DIPOLE_CHECKED bool io_file_check_writable(const char *path, dipole_status *status);
 

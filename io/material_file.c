@@ -523,7 +523,7 @@ static bool add(json_t *object, const char *key, json_t *value)
     return json_object_set_new(object, key, value) == 0;
 }
 
-static json_t *material_to_json(const struct io_material *material, const json_t *fit)
+json_t *io_material_to_json(const struct io_material *material, const json_t *fit)
 {
     const bool has_layers = io_material_has_layers(material);
     const dipole_medium *const medium = &material->layers[0][0].medium;
@@ -546,7 +546,7 @@ static json_t *material_to_json(const struct io_material *material, const json_t
 bool io_material_write(const char *path, const struct io_material *material, const json_t *fit,
                        dipole_status *status)
 {
-    json_t *const json = material_to_json(material, fit);
+    json_t *const json = io_material_to_json(material, fit);
     char *const text = json ? io_json_format(json) : NULL;
     json_decref(json);
     const dipole_place place = { .source = path };

@@ -52,6 +52,10 @@ DIPOLE_CHECKED bool io_material_open(const char *name, struct io_material *out, 
 DIPOLE_CHECKED bool io_material_parse(const struct io_json *at, struct io_material *out,
                                       dipole_status *status);
 
+/* A material as JSON, with coefficients whatever form they were given in; fit (may be NULL) becomes its
+ * "fit" block. NULL: out of memory, or a text that is not UTF-8. The caller owns it. */
+json_t *io_material_to_json(const struct io_material *material, const json_t *fit);
+
 /* Write a material file; fit (may be NULL) becomes its "fit" block. */
 DIPOLE_CHECKED bool io_material_write(const char *path, const struct io_material *material,
                                       const json_t *fit, dipole_status *status);

@@ -333,37 +333,74 @@ DIPOLE_API void dipole_stack_profile_gradient(const dipole_stack *stack, dipole_
  * shadow maps sum over these. theory.md T30.
  */
 typedef struct dipole_source {
-    double depth_mm; /* under the surface; negative for an image above it */
-    double weight;   /* alpha' times the part of the light; all add up to at most 1 */
+    double depth_mm; /* under the surface; negative for an image above it; never 0 */
+    double weight;   /* > 0; of the dipole and the beam model alpha' times the part of the light */
+    double sigma_tr_per_mm, sigma_tr_low_per_mm; /* how its light fades; low is what rounding took */
 } dipole_source;
 
 enum { DIPOLE_SOURCE_LIMIT = 128 };
 
+/* Plain data, to copy and to keep. */
+typedef struct dipole_sources {
+    size_t count; /* 0 where nothing leaves by the lit face */
+    dipole_source at[DIPOLE_SOURCE_LIMIT];
+    double sigma_tr_per_mm;    /* the slowest decay of all, which is what is left far out */
+    double max_relative_error; /* measured, of the profile of a flat surface, r_min_mm to r_max_mm */
+} dipole_sources;
+
 /*
- * The sources of a model: two of the dipole, pairs of depth z and -z of the beam model, whose line of
- * sources becomes a short sum.
+ * The sources of what a stack sends out through its lit face. T30.
  *
- *   epsilon   largest relative error of the profile over a flat surface from r_min_mm on, 1e-9 to 0.1; the
- *             total is exact. The dipole has no error.
- *   r_min_mm  from 1e-6 mean free paths on; the beam model has an integrable logarithm at 0
- *   returns   how many of *out are filled, 2 to DIPOLE_SOURCE_LIMIT; 0 with DIPOLE_NOT_SUPPORTED (other
- *             models) or DIPOLE_BAD_VALUE
+ *   Of the dipole's half-space (the multipole's is the same) they are the model's own two, without error.
+ * Of the beam model's half-space pairs of depth z and -z, a short sum for its line of sources, whose total
+ * is exact. Of all else pairs that are fitted to the profile; the power within r_max_mm is exact.
+ *
+ *   epsilon             largest relative error of the profile of a flat surface, 1e-9 to 0.1
+ *   r_min_mm, r_max_mm  where that holds: from 1e-6 of the first layer's mean free path on, and
+ *                       r_max_mm > r_min_mm, at most 1e6 times it
+ *
+ * Fails with DIPOLE_BAD_VALUE; with DIPOLE_NOT_SUPPORTED where the beam model's sum would be longer than
+ * DIPOLE_SOURCE_LIMIT; with DIPOLE_NOT_CONVERGED, naming what was reached, where a fit comes no nearer.
+ * *out is then undefined. Allocates nothing; a fit takes half a megabyte of stack.
  */
-DIPOLE_API DIPOLE_CHECKED size_t dipole_sources_init(const dipole_coefficients *coefficients,
-                                                     dipole_model model, double epsilon, double r_min_mm,
-                                                     dipole_source out[DIPOLE_SOURCE_LIMIT],
-                                                     dipole_status *status);
+DIPOLE_API DIPOLE_CHECKED bool dipole_sources_init(const dipole_stack *stack, double epsilon,
+                                                   double r_min_mm, double r_max_mm, dipole_sources *out,
+                                                   dipole_status *status);
 
 /*
  * Power that leaves per mm^2 at out_mm for one unit that enters at in_mm through a surface with the unit
  * normal in_normal, in 1/mm^2. Over a flat surface it is the profile. Where the shape is thin or concave a
- * point can lie next to a source, and the profile would have no bound: no source is taken to be nearer than
- * its own depth. What that does to the energy is in theory.md T30.
+ * point can lie next to a source, and the profile would have no bound: nearer to a source than its own
+ * depth z its part is continued with the same value and slope, level at the source, where it is (1 + b/2)
+ * times what it is at distance z; b = (3 + x^2/(1 + x))/2, x = sigma_tr z. What that does to the energy is
+ * in theory.md T30.
  */
-DIPOLE_API double dipole_rd_between_per_mm2(const dipole_coefficients *coefficients,
-                                            const dipole_source *sources, size_t count,
-                                            const double in_mm[3], const double in_normal[3],
-                                            const double out_mm[3]);
+DIPOLE_API double dipole_sources_between_per_mm2(const dipole_sources *sources, const double in_mm[3],
+                                                 const double in_normal[3], const double out_mm[3]);
+
+/*
+ * The same at one distance |out_mm - in_mm| in count directions, for baking volumes. A value does not
+ * depend on what else is asked for.
+ *
+ *   cosines  of the angle between in_normal and out_mm - in_mm, -1 (straight below) to 1
+ *   values   count doubles, relative error below 3e-15 (8 + sigma_tr d), d the distance to the farthest
+ *            source; NaN outside the ranges
+ */
+DIPOLE_API void dipole_sources_profile_per_mm2(const dipole_sources *sources, double distance_mm,
+                                               const double *cosines, size_t count, double *values);
+
+/*
+ * Power that the same sends through a disc parallel to the surface, with its centre on the normal at
+ * height_mm above the point of entry (negative: below, where light arrives at another side of a shape).
+ *
+ *   r_mm     of the disc, >= 0, may be INFINITY
+ *   returns  its closed form, no digits lost at small r_mm: relative error below 3e-15 (8 + sigma_tr d);
+ *            NaN outside the range
+ */
+DIPOLE_API double dipole_sources_within(const dipole_sources *sources, double height_mm, double r_mm);
+/* The same of count discs, much faster a disc. */
+DIPOLE_API void dipole_sources_within_many(const dipole_sources *sources, double height_mm,
+                                           const double *r_mm, size_t count, double *values);
 
 /* ---- media from reflectance and a length -------------------------------------------------------- */
 

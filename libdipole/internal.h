@@ -46,6 +46,11 @@ double dipole_fresnel_second_moment_inside(double eta);
 void dipole_fresnel_mean_inside(double eta, double cosine2_lo, double cosine2_hi, double *reflected,
                                 double *transmitted);
 
+/* What sources are made from (stack.c): the model; and kappa_1, with which the profile of the lit face
+ * fades far out. T26 */
+dipole_model dipole_stack_model(const dipole_stack *stack);
+double dipole_stack_decay_per_mm(const dipole_stack *stack);
+
 /* ---- one spatial frequency of a stack (layers.c) -------------------------------------------------- */
 
 enum { SLAB_MOMENTS = 16 };

@@ -90,12 +90,12 @@ static inline double decay_times(double factor, struct decay_parts e)
     return MULTIPLY_ADD(factor, e.excess, factor) * e.scale_1 * e.scale_2;
 }
 
-/* 1 - e^(-x), no digits lost at small x */
+/* 1 - e^(-x), no digits lost at small x; e^-700 is nothing beside 1 */
 static inline double decay_deficit(double x)
 {
-    const struct decay_parts e = decay_split(x, 0.0);
-    const double scale = e.scale_1 * e.scale_2;
-    return (1.0 - scale) - scale * e.excess;
+    const double y = x > 700.0 ? 700.0 : x;
+    const double k = decay_exponent(y) - 0x1.8p52, scale = power_of_two(k);
+    return (1.0 - scale) - scale * decay_excess(y, 0.0, k);
 }
 
 /* ---- where the source is seen from ---------------------------------------------------------------- */

@@ -286,6 +286,16 @@ const dipole_coefficients *dipole_stack_coefficients(const dipole_stack *stack, 
     return &stack->coefficients[place(stack, index)];
 }
 
+dipole_model dipole_stack_model(const dipole_stack *stack)
+{
+    return stack->model;
+}
+
+double dipole_stack_decay_per_mm(const dipole_stack *stack)
+{
+    return singularity_per_mm(stack);
+}
+
 /* ---- what a stack sends out ----------------------------------------------------------------------- */
 
 double dipole_stack_total(const dipole_stack *stack, dipole_face face)

@@ -1,32 +1,33 @@
 /* lutgen: bake the tables that a renderer needs. */
 #include "cli/cli.h"
 #include "io/file.h"
-#include "lutgen/lut.h"
+#include "lutgen/job.h"
 
-#include <errno.h>
 #include <jansson.h>
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+
+/* Largest relative errors by default: a volume of the usual size errs by less. */
+#define SPLAT_EPSILON 0.001
+#define TSM_EPSILON 0.15
 
 struct options {
     struct cli_common common;
-    const char *folder;
-    double epsilon;
-    int kind;
-    bool is_half;
+    const char *folder, *size_text;
+    double epsilon; /* 0: by kind */
+    unsigned kinds, formats;
+    int node_count, volume[3]; /* 0: chosen */
+    bool is_half, is_forced, is_plotted;
+    double thread_count;
 };
 
-static const char *const kinds[] = { "splat1d", NULL };
-
-/* One material on its way to a table. */
-struct job {
-    const char *material_path;
-    char path[4096]; /* of the table */
-    struct io_material material;
-    struct lut_splat1d *lut;
-    double bake_ms;
+/* All that is asked for: the materials, and a table or several of each. */
+struct batch {
+    int material_count, job_count;
+    char **paths;
+    struct io_material *materials;
+    struct lut_job *jobs;
 };
 
 /* Length of a path's file name without folder and ".json". */
@@ -39,94 +40,120 @@ static size_t stem_find(const char *path, const char **stem_out)
     return is_json ? length - 5 : length;
 }
 
-/* ---- steps -------------------------------------------------------------------------------------- */
+/* ---- what is asked for -------------------------------------------------------------------------- */
+
+/* "N": nodes of splat tables; "SxTxR": a volume. */
+static bool size_parse(struct options *options, dipole_status *status)
+{
+    int size[3], end = 0;
+    const char *const text = options->size_text;
+    const bool has_volume = (options->kinds >> LUT_TSM & 1U) != 0, has_splat = (options->kinds & 3U) != 0;
+    if (!text)
+        return true;
+    if (sscanf(text, "%5dx%5dx%5d%n", &size[0], &size[1], &size[2], &end) == 3 && text[end] == '\0') {
+        memcpy(options->volume, size, sizeof size);
+        return has_volume ||
+               dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "--size is \"%.100s\", that of a volume, but --kind has no tsm", text);
+    }
+    end = 0;
+    if (sscanf(text, "%5d%n", &size[0], &end) == 1 && text[end] == '\0') {
+        options->node_count = size[0];
+        return has_splat ||
+               dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "--size is \"%.100s\", that of a splat table, but --kind is tsm: expected SxTxR",
+                           text);
+    }
+    return dipole_fail(
+        status, DIPOLE_BAD_VALUE, NULL,
+        "--size is \"%.100s\", expected a number of texels (splat1d, splat2d) or SxTxR (tsm)", text);
+}
+
+static bool job_add(const struct options *options, struct batch *batch, enum lut_kind kind, int first,
+                    int count, dipole_status *status)
+{
+    struct lut_job *const job = &batch->jobs[batch->job_count];
+    const char *stem = "materials";
+    const size_t length = kind == LUT_SPLAT2D ? strlen(stem) : stem_find(batch->paths[first], &stem);
+    const int *const volume = options->volume;
+    *job = (struct lut_job){
+        .request = { .kind = kind,
+                     .materials = &batch->materials[first],
+                     .material_count = (size_t)count,
+                     .epsilon = options->epsilon > 0 ? options->epsilon
+                                : kind == LUT_TSM    ? TSM_EPSILON
+                                                     : SPLAT_EPSILON,
+                     .is_half = options->is_half },
+        .source = kind == LUT_SPLAT2D ? NULL : batch->paths[first],
+        .formats = options->formats,
+        .is_plotted = options->is_plotted,
+        .thread_count = (int)options->thread_count,
+    };
+    if (kind == LUT_TSM)
+        memcpy(job->request.size, volume, sizeof job->request.size);
+    else
+        job->request.size[0] = options->node_count;
+    const int size = snprintf(job->stem, sizeof job->stem, "%s/%.*s.%s", options->folder, (int)length, stem,
+                              lut_kind_names[kind]);
+    if (size < 0 || (size_t)size >= sizeof job->stem - 16)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "the path of the table of %.200s is too long",
+                           batch->paths[first]);
+    for (int i = 0; i < batch->job_count; i++)
+        if (strcmp(batch->jobs[i].stem, job->stem) == 0) {
+            char path[sizeof job->stem + 16];
+            lut_job_path(job, lut_job_first_format(job), path, sizeof path);
+            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                               "%.100s and %.100s would both become %.100s, expected different file names",
+                               batch->jobs[i].source, batch->paths[first], path);
+        }
+    batch->job_count++;
+    return true;
+}
 
 /* Everything that can be wrong with the inputs, before anything is written. */
-static bool jobs_read(const struct cli_tool *tool, const struct options *options, struct job *jobs,
-                      int count, dipole_status *status)
+static bool batch_read(const struct cli_tool *tool, const struct options *options, struct batch *batch,
+                       dipole_status *status)
 {
-    for (int i = 0; i < count; i++) {
-        struct job *const job = &jobs[i];
-        const char *stem;
-        const size_t length = stem_find(job->material_path, &stem);
-        const int size = snprintf(job->path, sizeof job->path, "%s/%.*s.splat1d.exr", options->folder,
-                                  (int)length, stem);
-        if (size < 0 || (size_t)size >= sizeof job->path)
-            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
-                               "the path of the table of %.200s is too long", job->material_path);
-        for (int j = 0; j < i; j++)
-            if (strcmp(jobs[j].path, job->path) == 0)
-                return dipole_fail(
-                    status, DIPOLE_BAD_VALUE, NULL,
-                    "%.100s and %.100s would both become %.100s, expected different file names",
-                    jobs[j].material_path, job->material_path, job->path);
-        if (!io_material_open(job->material_path, &job->material, status) ||
-            !io_material_check_classical(&job->material, status))
+    for (int kind = 0; kind < LUT_KIND_COUNT; kind++) {
+        if (!(options->kinds >> kind & 1U))
+            continue;
+        const bool is_joint = kind == LUT_SPLAT2D;
+        for (int i = 0; i < (is_joint ? 1 : batch->material_count); i++)
+            if (!job_add(options, batch, (enum lut_kind)kind, i, is_joint ? batch->material_count : 1,
+                         status))
+                return false;
+    }
+    for (int i = 0; i < batch->material_count; i++) {
+        if (!io_material_open(batch->paths[i], &batch->materials[i], status))
             return false;
-        if (job->material.warning[0])
-            cli_note(tool, &options->common, "%s: %s", job->material_path, job->material.warning);
+        if (batch->materials[i].warning[0])
+            cli_note(tool, &options->common, "%s: %s", batch->paths[i], batch->materials[i].warning);
     }
     return true;
 }
 
-static bool job_bake(const struct options *options, struct job *job, dipole_status *status)
-{
-    const double start_s = cli_now_s();
-    dipole_status why = { 0 };
-    if (!(options->is_half ? lut_splat1d_bake_half : lut_splat1d_bake)(&job->material, options->epsilon,
-                                                                       &job->lut, &why)) {
-        const dipole_place place = { .source = job->material_path };
-        return dipole_fail(status, why.code, &place, "%s", why.message);
-    }
-    job->bake_ms = (cli_now_s() - start_s) * 1000;
-    return true;
-}
+/* ---- steps -------------------------------------------------------------------------------------- */
 
-/* Read the written table back and audit it at points of its own. */
-static bool table_check(const char *path, double epsilon, dipole_status *status)
-{
-    struct lut_splat1d *lut = NULL;
-    if (!lut_splat1d_read(path, &lut, status))
-        return false;
-    const double error = lut_splat1d_audit(lut, (size_t)lut->axis.node_count * 16, 3);
-    lut_splat1d_destroy(lut);
-    return error <= epsilon ||
-           dipole_fail(status, DIPOLE_IO_FAILED, NULL,
-                       "read back, the table errs by %.3g, expected at most %g", error, epsilon);
-}
-
-/* Write under another name, check what is on disk, then give it its name. */
-static bool job_write(const struct options *options, const struct job *job, dipole_status *status)
-{
-    char unchecked[sizeof job->path + 16];
-    snprintf(unchecked, sizeof unchecked, "%s.unchecked", job->path);
-    dipole_status why = { 0 };
-    bool is_done = lut_splat1d_write(job->lut, unchecked, options->is_half, &why);
-    if (is_done) {
-        is_done = table_check(unchecked, options->epsilon, &why);
-        if (is_done && rename(unchecked, job->path) != 0)
-            is_done = dipole_fail(&why, DIPOLE_IO_FAILED, NULL, "cannot be written: %s", strerror(errno));
-        if (!is_done)
-            unlink(unchecked);
-    }
-    const dipole_place place = { .source = job->path };
-    return is_done || dipole_fail(status, why.code, &place, "%s", why.message);
-}
-
-static bool jobs_run(const struct cli_tool *tool, const struct options *options, struct job *jobs,
-                     int count, dipole_status *status)
+static bool batch_run(const struct cli_tool *tool, const struct options *options, struct batch *batch,
+                      dipole_status *status)
 {
     struct cli_progress progress;
     cli_progress_start(&progress, tool, &options->common);
-    bool is_done = jobs_read(tool, options, jobs, count, status);
+    bool is_done = batch_read(tool, options, batch, status);
+    const int count = batch->job_count;
     for (int i = 0; i < count && is_done; i++) {
-        is_done = job_bake(options, &jobs[i], status);
-        cli_progress_show(&progress, "baking", 0.5 * (i + 1) / count);
+        struct lut_job *const job = &batch->jobs[i];
+        cli_progress_show(&progress, job->stem, 0.7 * i / count);
+        if (!options->is_forced)
+            lut_job_find_current(job);
+        is_done = job->is_current || lut_job_bake(job, status);
     }
     is_done = is_done && io_folder_make(options->folder, status);
     for (int i = 0; i < count && is_done; i++) {
-        is_done = job_write(options, &jobs[i], status);
-        cli_progress_show(&progress, "writing", 0.5 + 0.5 * (i + 1) / count);
+        struct lut_job *const job = &batch->jobs[i];
+        cli_progress_show(&progress, "writing", 0.7 + 0.3 * i / count);
+        is_done = (job->is_current || lut_job_write(job, status)) &&
+                  (!job->is_plotted || lut_job_plot(job, status));
     }
     cli_progress_show(&progress, "writing", 1);
     return is_done;
@@ -134,15 +161,41 @@ static bool jobs_run(const struct cli_tool *tool, const struct options *options,
 
 /* ---- results ------------------------------------------------------------------------------------ */
 
-static bool print_json(const struct job *jobs, int count, dipole_status *status)
+/* A number of texels, or [width, rows], or [S, T, R]. */
+static json_t *size_to_json(const struct lut_job *job)
+{
+    const int width = job->width, height = job->height;
+    switch (job->request.kind) {
+    case LUT_SPLAT2D:
+        return json_pack("[ii]", width, height);
+    case LUT_TSM:
+        return json_pack("[iii]", width / job->depth, height, job->depth);
+    case LUT_SPLAT1D:
+    case LUT_KIND_COUNT:
+        break;
+    }
+    return json_integer(width);
+}
+
+static bool print_json(const struct batch *batch, dipole_status *status)
 {
     json_t *const files = json_array();
     bool is_done = files != NULL;
-    for (int i = 0; i < count && is_done; i++)
-        is_done = json_array_append_new(
-                      files, json_pack("{s:s, s:s, s:i, s:f, s:f}", "path", jobs[i].path, "kind", kinds[0],
-                                       "size", jobs[i].lut->axis.node_count, "max_relative_error",
-                                       jobs[i].lut->max_relative_error, "bake_ms", jobs[i].bake_ms)) == 0;
+    for (int i = 0; i < batch->job_count; i++) {
+        const struct lut_job *const job = &batch->jobs[i];
+        for (int format = 0; format < LUT_FORMAT_COUNT && is_done; format++) {
+            char path[sizeof job->stem + 16];
+            if (!(job->formats >> format & 1U))
+                continue;
+            lut_job_path(job, (enum lut_format)format, path, sizeof path);
+            is_done = json_array_append_new(
+                          files, json_pack("{s:s, s:s, s:o, s:f, s:f, s:b, s:f}", "path", path, "kind",
+                                           lut_kind_names[job->request.kind], "size", size_to_json(job),
+                                           "max_relative_error", job->error.max, "p99_relative_error",
+                                           job->error.p99, "up_to_date", job->is_current, "bake_ms",
+                                           job->bake_ms)) == 0;
+        }
+    }
     json_t *const result = json_pack("{s:O?}", "files", files);
     char *const text = is_done && result ? io_json_format(result) : NULL;
     if (text)
@@ -157,41 +210,69 @@ static bool print_json(const struct job *jobs, int count, dipole_status *status)
     return is_done;
 }
 
-static void print_table(const struct job *jobs, int count)
+static void size_to_text(const struct lut_job *job, char out[48])
 {
-    int width = 4;
-    for (int i = 0; i < count; i++)
-        width = (int)strlen(jobs[i].path) > width ? (int)strlen(jobs[i].path) : width;
-    printf("%-*s  %-7s  %6s  %18s  %8s\n", width, "path", "kind", "size", "max_relative_error", "bake_ms");
-    printf("%-*s  %-7s  %6s  %18s  %8s\n", width, "", "", "texels", "", "ms");
-    for (int i = 0; i < count; i++)
-        printf("%-*s  %-7s  %6d  %18.3g  %8.1f\n", width, jobs[i].path, kinds[0],
-               jobs[i].lut->axis.node_count, jobs[i].lut->max_relative_error, jobs[i].bake_ms);
+    const int width = job->width, height = job->height;
+    if (job->request.kind == LUT_TSM)
+        snprintf(out, 48, "%dx%dx%d", width / job->depth, height, job->depth);
+    else if (job->request.kind == LUT_SPLAT2D)
+        snprintf(out, 48, "%dx%d", width, height);
+    else
+        snprintf(out, 48, "%d", width);
 }
 
-static bool run(const struct cli_tool *tool, const struct options *options, char **material_paths,
-                int count, dipole_status *status)
+static void print_table(const struct batch *batch)
 {
-    struct job *const jobs = calloc((size_t)count, sizeof *jobs);
-    if (!jobs)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for %d materials", count);
-    for (int i = 0; i < count; i++)
-        jobs[i].material_path = material_paths[i];
-    bool is_done = jobs_run(tool, options, jobs, count, status);
+    int width = 4;
+    char path[sizeof batch->jobs->stem + 16];
+    for (int i = 0; i < batch->job_count; i++) {
+        lut_job_path(&batch->jobs[i], lut_job_first_format(&batch->jobs[i]), path, sizeof path);
+        width = (int)strlen(path) > width ? (int)strlen(path) : width;
+    }
+    printf("%-*s  %-7s  %10s  %18s  %18s  %10s\n", width, "path", "kind", "size", "max_relative_error",
+           "p99_relative_error", "bake_ms");
+    printf("%-*s  %-7s  %10s  %18s  %18s  %10s\n", width, "", "", "texels", "", "", "ms");
+    for (int i = 0; i < batch->job_count; i++) {
+        const struct lut_job *const job = &batch->jobs[i];
+        for (int format = 0; format < LUT_FORMAT_COUNT; format++) {
+            char size[48], time[32] = "up to date";
+            if (!(job->formats >> format & 1U))
+                continue;
+            lut_job_path(job, (enum lut_format)format, path, sizeof path);
+            size_to_text(job, size);
+            if (!job->is_current)
+                snprintf(time, sizeof time, "%.1f", job->bake_ms);
+            printf("%-*s  %-7s  %10s  %18.3g  %18.3g  %10s\n", width, path,
+                   lut_kind_names[job->request.kind], size, job->error.max, job->error.p99, time);
+        }
+    }
+}
+
+static bool run(const struct cli_tool *tool, struct options *options, char **paths, int count,
+                dipole_status *status)
+{
+    struct batch batch = { .material_count = count,
+                           .paths = paths,
+                           .materials = calloc((size_t)count, sizeof *batch.materials),
+                           .jobs = calloc((size_t)count * LUT_KIND_COUNT, sizeof *batch.jobs) };
+    bool is_done = (batch.materials && batch.jobs) ||
+                   dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for %d materials", count);
+    is_done = is_done && batch_run(tool, options, &batch, status);
     if (is_done && options->common.json)
-        is_done = print_json(jobs, count, status);
+        is_done = print_json(&batch, status);
     else if (is_done)
-        print_table(jobs, count);
+        print_table(&batch);
     is_done = is_done && cli_stdout_finish(status);
-    for (int i = 0; i < count; i++)
-        lut_splat1d_destroy(jobs[i].lut);
-    free(jobs);
+    for (int i = 0; i < batch.job_count; i++)
+        lut_job_end(&batch.jobs[i]);
+    free(batch.jobs);
+    free(batch.materials);
     return is_done;
 }
 
 int main(int argc, char **argv)
 {
-    struct options options = { .epsilon = 0.001 };
+    struct options options = { .kinds = 1U << LUT_SPLAT1D, .formats = 1U << LUT_EXR };
     const struct cli_option table[] = {
         { .name = "output",
           .letter = 'o',
@@ -204,32 +285,73 @@ int main(int argc, char **argv)
           .kind = CLI_NUMBER,
           .target = &options.epsilon,
           .argument = "E",
-          .min = 1e-6,
-          .max = 0.5,
-          .help =
-              "Largest relative error of a table, and part of the light left beyond its end r_max; 1e-6 "
-              "to 0.5, default 0.001." },
+          .min = LUT_EPSILON_MIN,
+          .max = LUT_EPSILON_MAX,
+          .help = "Largest relative error of a table; 1e-6 to 0.5, default 0.001, of tsm 0.15. A splat "
+                  "table ends "
+                  "where as much of the light is left." },
         { .name = "kind",
-          .kind = CLI_CHOICE,
-          .target = &options.kind,
-          .argument = "KIND",
-          .choices = kinds,
-          .help = "Kind of table; this version bakes splat1d, default splat1d." },
+          .letter = 'k',
+          .kind = CLI_CHOICES,
+          .target = &options.kinds,
+          .argument = "KIND,...",
+          .choices = lut_kind_names,
+          .help = "Kinds of table, with commas between: splat1d (a row of texels), splat2d (one table with "
+                  "a row for "
+                  "each material), tsm (a volume for translucent shadow maps); default splat1d." },
+        { .name = "format",
+          .letter = 'f',
+          .kind = CLI_CHOICES,
+          .target = &options.formats,
+          .argument = "FORMAT,...",
+          .choices = lut_format_names,
+          .help = "Kinds of file, with commas between: exr (attributes inside), dds (DX10 texture or "
+                  "volume) or raw "
+                  "(bare numbers), each of the latter with a .json beside it; default exr." },
         { .name = "half",
           .kind = CLI_FLAG,
           .target = &options.is_half,
-          .help = "Store half instead of float; needs epsilon above 0.00049." },
+          .help = "Store half instead of float, with the same error; needs epsilon above 0.00049." },
+        { .name = "size",
+          .letter = 's',
+          .kind = CLI_TEXT,
+          .target = &options.size_text,
+          .argument = "N|SxTxR",
+          .help = "Texels of a splat table (8 to 32768; default: the fewest that keep epsilon), or of a "
+                  "volume (S, T 8 "
+                  "to 1024, R 16, 32, 64, 128 or 256; default: 64x64x32, S and T doubled until epsilon is "
+                  "kept)." },
+        { .name = "force",
+          .kind = CLI_FLAG,
+          .target = &options.is_forced,
+          .help = "Bake again what is up to date." },
+        { .name = "plot",
+          .kind = CLI_FLAG,
+          .target = &options.is_plotted,
+          .help = "Write DIR/NAME.KIND.svg as well: curves, or a contact sheet of the volume's slices." },
+        { .name = "threads",
+          .kind = CLI_NUMBER,
+          .target = &options.thread_count,
+          .argument = "N",
+          .min = 0,
+          .max = 64,
+          .help =
+              "Threads that bake a volume; the bytes do not depend on it. Default 0: one per processor." },
         { .name = NULL },
     };
     const struct cli_tool tool = {
         .name = "lutgen",
-        .summary = "Bake diffusion profiles of materials into EXR tables",
+        .summary = "Bake diffusion profiles of materials into tables for renderers",
         .usage = "MATERIAL.json... -o DIR",
         .details =
-            "Each material becomes DIR/NAME.splat1d.exr: R_d(r) in 1/mm^2 for R, G and B along one row "
-            "of texels, from r = 0 to r_max. Mapping of the axis, coefficients and the measured error "
-            "stand in attributes that begin with dipole:. A table is read back and audited before it "
-            "gets its name.",
+            "Each material becomes DIR/NAME.splat1d.exr: R_d(r) for R, G and B along one row of texels, "
+            "from r = 0 "
+            "to r_max; DIR/NAME.tsm.exr: slices of a volume side by side; all materials together become "
+            "DIR/materials.splat2d.exr. Mappings of the axes, coefficients and measured errors stand in "
+            "attributes "
+            "that begin with dipole:. A table is read back and audited before it gets its name, and left "
+            "alone when "
+            "it is there already, baked from the same inputs.",
         .options = table,
         .operand_min = 1,
         .operand_max = INT_MAX,
@@ -250,6 +372,8 @@ int main(int argc, char **argv)
         dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "no --output (-o) DIR was given; try --help");
         return cli_report(&tool, &status, EXIT_USAGE);
     }
+    if (!size_parse(&options, &status))
+        return cli_report(&tool, &status, EXIT_USAGE);
     if (!run(&tool, &options, operands, operand_count, &status))
         return cli_report(&tool, &status, EXIT_FAILED);
     return EXIT_DONE;

@@ -32,6 +32,13 @@ int plot_line_count(const char *s, double font_px, double limit_px)
     return count;
 }
 
+double plot_head_height_px(const char *title, const char *subtitle, double limit_px)
+{
+    return PLOT_PAD_PX +
+           PLOT_LINE_HEIGHT * PLOT_TITLE_PX * plot_line_count(title, PLOT_TITLE_PX, limit_px) +
+           PLOT_LINE_HEIGHT * PLOT_SUBTITLE_PX * plot_line_count(subtitle, PLOT_SUBTITLE_PX, limit_px) + 10;
+}
+
 /* ---- ranges ------------------------------------------------------------------------------------- */
 
 static void extend(enum plot_scale scale, const double *values, size_t index, double *low, double *high)
@@ -91,7 +98,7 @@ static double tick_label_width_px(const struct plot_tick_label *label)
            label_width_px(label->exponent, PLOT_LABEL_PX * 0.75);
 }
 
-static double widest_tick_label_px(const struct plot_ticks *ticks)
+double plot_ticks_width_px(const struct plot_ticks *ticks)
 {
     double width = 0;
     for (size_t i = 0; i < ticks->count; i++) {
@@ -213,11 +220,7 @@ static void layout_init(const struct plot *plot, struct plot_layout *layout)
     right = fmin(fmax(right, flag_width), layout->width_px / 2);
     qsort(layout->poles, layout->pole_count, sizeof *layout->poles, pole_compare);
 
-    const double head =
-        PLOT_PAD_PX +
-        PLOT_LINE_HEIGHT * PLOT_TITLE_PX * plot_line_count(plot->title, PLOT_TITLE_PX, text_px) +
-        PLOT_LINE_HEIGHT * PLOT_SUBTITLE_PX * plot_line_count(plot->subtitle, PLOT_SUBTITLE_PX, text_px) +
-        10;
+    const double head = plot_head_height_px(plot->title, plot->subtitle, text_px);
     const double foot =
         PLOT_PAD_PX + 8 + 1.6 * PLOT_LABEL_PX + (plot->x.title ? 1.9 * PLOT_LABEL_PX : 0) +
         PLOT_LINE_HEIGHT * PLOT_CAPTION_PX * plot_line_count(plot->caption, PLOT_CAPTION_PX, text_px);
@@ -225,7 +228,7 @@ static void layout_init(const struct plot *plot, struct plot_layout *layout)
     layout->bottom = fmax(layout->height_px - foot, head + 20);
     plot_ticks_place(&layout->y, (int)fmax(2, (layout->bottom - head) / 36), &layout->y_ticks);
     layout->left = PLOT_PAD_PX + (plot->y.title ? 1.9 * PLOT_LABEL_PX : 0) +
-                   widest_tick_label_px(&layout->y_ticks) + 12;
+                   plot_ticks_width_px(&layout->y_ticks) + 12;
     layout->left = fmin(layout->left, layout->right - 20);
     const double width = layout->right - layout->left;
     plot_ticks_place(&layout->x, (int)fmax(2, width / 80), &layout->x_ticks);

@@ -54,4 +54,10 @@ size_t plot_line_break(const char *s, double font_px, double limit_px, const cha
 /* Number of lines of s (may be NULL) broken so. */
 int plot_line_count(const char *s, double font_px, double limit_px);
 
+/* From the top edge to where the picture begins, below its title and subtitle (either may be NULL). */
+double plot_head_height_px(const char *title, const char *subtitle, double limit_px);
+
+/* Width of the widest label. */
+double plot_ticks_width_px(const struct plot_ticks *ticks);
+
 #endif

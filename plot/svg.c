@@ -1,3 +1,4 @@
+#include "plot/draw.h"
 #include "plot/layout.h"
 #include "plot/text.h"
 
@@ -23,26 +24,6 @@ static const char *series_color(const struct plot *plot, size_t index)
     return color ? color : palette[index % COUNT(palette)];
 }
 
-/* Draw s from baseline y_px of its first line down. */
-static void lines_draw(struct plot_text *out, const char *s, double x_px, double y_px, double font_px,
-                       const char *style, double limit_px)
-{
-    while (s && *s) {
-        const char *const line = s;
-        const size_t size = plot_line_break(line, font_px, limit_px, &s);
-        char *const copy = strndup(line, size);
-        if (!copy) {
-            out->has_failed = true;
-            return;
-        }
-        plot_text_print(out, "<text x=\"%f\" y=\"%f\" font-size=\"%f\" ", x_px, y_px, font_px);
-        plot_text_add(out, style, strlen(style));
-        plot_text_print(out, ">%s</text>\n", copy);
-        free(copy);
-        y_px += PLOT_LINE_HEIGHT * font_px;
-    }
-}
-
 static void axis_line(struct plot_text *out, const struct plot_layout *layout, double px, bool is_x,
                       const char *style)
 {
@@ -50,17 +31,6 @@ static void axis_line(struct plot_text *out, const struct plot_layout *layout, d
                     is_x ? layout->top : px, is_x ? px : layout->right, is_x ? layout->bottom : px);
     plot_text_add(out, style, strlen(style));
     plot_text_print(out, "/>\n");
-}
-
-static void tick_label_draw(struct plot_text *out, const struct plot_tick_label *label, double x_px,
-                            double y_px, const char *anchor)
-{
-    plot_text_print(out, "<text x=\"%f\" y=\"%f\" text-anchor=\"%s\" font-size=\"%d\">%s", x_px, y_px,
-                    anchor, PLOT_LABEL_PX, label->base);
-    if (label->exponent[0])
-        plot_text_print(out, "<tspan dy=\"%f\" font-size=\"%f\">%s</tspan>", -0.42 * PLOT_LABEL_PX,
-                        0.75 * PLOT_LABEL_PX, label->exponent);
-    plot_text_print(out, "</text>\n");
 }
 
 static void axis_draw(struct plot_text *out, const struct plot *plot, const struct plot_layout *layout,
@@ -82,9 +52,9 @@ static void axis_draw(struct plot_text *out, const struct plot *plot, const stru
             struct plot_tick_label label;
             plot_tick_label_init(ticks, tick, &label);
             if (is_x)
-                tick_label_draw(out, &label, px, layout->bottom + 9 + PLOT_LABEL_PX, "middle");
+                plot_tick_label_draw(out, &label, px, layout->bottom + 9 + PLOT_LABEL_PX, "middle");
             else
-                tick_label_draw(out, &label, layout->left - 10, px + 0.36 * PLOT_LABEL_PX, "end");
+                plot_tick_label_draw(out, &label, layout->left - 10, px + 0.36 * PLOT_LABEL_PX, "end");
         }
     }
     if (!axis->title)
@@ -315,23 +285,12 @@ static bool has_data(const struct plot *plot, const struct plot_layout *layout)
 
 static void plot_draw(struct plot_text *out, const struct plot *plot, const struct plot_layout *layout)
 {
-    const int width = (int)layout->width_px, height = (int)layout->height_px;
-    const double text_px = layout->width_px - 2 * PLOT_PAD_PX;
-    plot_text_print(out,
-                    "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
-                    "viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" fill=\"#222222\" role=\"img\">\n",
-                    width, height, width, height);
-    if (plot->title)
-        plot_text_print(out, "<title>%s</title>\n", plot->title);
-    plot_text_print(out, "<rect width=\"%d\" height=\"%d\" fill=\"white\"/>\n", width, height);
-
-    double y_px = PLOT_PAD_PX + PLOT_TITLE_PX;
-    lines_draw(out, plot->title, PLOT_PAD_PX, y_px, PLOT_TITLE_PX, "font-weight=\"bold\"", text_px);
-    y_px += PLOT_LINE_HEIGHT * PLOT_TITLE_PX * plot_line_count(plot->title, PLOT_TITLE_PX, text_px) - 5;
-    lines_draw(out, plot->subtitle, PLOT_PAD_PX, y_px, PLOT_SUBTITLE_PX, "fill=\"#555555\"", text_px);
-    const int caption_lines = plot_line_count(plot->caption, PLOT_CAPTION_PX, text_px);
-    y_px = layout->height_px - PLOT_PAD_PX + 4 - PLOT_LINE_HEIGHT * PLOT_CAPTION_PX * (caption_lines - 1);
-    lines_draw(out, plot->caption, PLOT_PAD_PX, y_px, PLOT_CAPTION_PX, "fill=\"#555555\"", text_px);
+    const struct plot_page page = { .width_px = layout->width_px,
+                                    .height_px = layout->height_px,
+                                    .title = plot->title,
+                                    .subtitle = plot->subtitle,
+                                    .caption = plot->caption };
+    plot_page_begin(out, &page);
 
     axis_draw(out, plot, layout, true);
     axis_draw(out, plot, layout, false);

@@ -27,13 +27,14 @@ int render_bands_make(double spacing_mm, double r_max_mm, double ring_spacings,
 /* Part of the profile that the band carries at r_mm, 0 to 1; the bands' weights add to 1. */
 double render_band_weight(const struct render_band *band, double r_mm);
 
-/* Nodes of each band's table: those of the table, and as many between them as make the weights smooth. */
-int render_bands_node_count(const struct lut_splat1d *table);
+/* The axis of the bands' own tables: in the logarithm (power 0), with nodes as dense as the weights need.
+ */
+struct lut_axis render_bands_axis(const struct lut_splat *table);
 
 /*
- * Each band's table, R G B 0 per node on the axis of the table: band after band, node_count x 4 floats
+ * Each band's table, R G B 0 per node on that axis: band after band, node_count x 4 floats
  * each. The caller frees it; NULL: no memory.
  */
-float *render_bands_bake(const struct lut_splat1d *table, const struct render_band *bands, int band_count);
+float *render_bands_bake(const struct lut_splat *table, const struct render_band *bands, int band_count);
 
 #endif

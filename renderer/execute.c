@@ -371,12 +371,13 @@ static bool draw_band(const struct render_frame *frame, int band, dipole_status 
     return true;
 }
 
-static bool draw_splats(const struct render_frame *frame, const struct lut_splat1d *table,
+static bool draw_splats(const struct render_frame *frame, const struct lut_splat *table,
                         dipole_status *status)
 {
     const struct render_plan *const plan = frame->plan;
-    const int node_count = render_bands_node_count(table);
-    const double end = table->axis.r_max_mm / table->axis.scale_mm;
+    const struct lut_axis axis = render_bands_axis(table);
+    const int node_count = axis.node_count;
+    const double end = axis.r_max_mm / axis.scale_mm;
     float *const nodes = render_bands_bake(table, plan->bands, plan->band_count);
     if (!nodes)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %d bands of %d nodes",
@@ -387,8 +388,7 @@ static bool draw_splats(const struct render_frame *frame, const struct lut_splat
     glBindTextureUnit(UNIT_TABLE, frame->executor->table_buffer.texture);
     render_set_int(frame->program, "profile_table", UNIT_TABLE);
     render_set_int(frame->program, "profile_last_node", node_count - 1);
-    render_set_float(frame->program, "profile_inverse_scale2",
-                     1 / (table->axis.scale_mm * table->axis.scale_mm));
+    render_set_float(frame->program, "profile_inverse_scale2", 1 / (axis.scale_mm * axis.scale_mm));
     render_set_float(frame->program, "profile_nodes_per_log2", (node_count - 1) / log2(1 + end * end));
     bool done = true;
     for (int b = 0; done && b < plan->band_count; b++) {
@@ -503,7 +503,7 @@ static void draw_scene(const struct render_frame *frame)
 }
 
 static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
-                     const struct lut_splat1d *table, dipole_status *status)
+                     const struct lut_splat *table, dipole_status *status)
 {
     struct render_executor *const executor = frame->executor;
     if (pass->draw == RENDER_DRAW_NOTHING)
@@ -536,7 +536,7 @@ static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
 }
 
 bool render_executor_run(struct render_executor *executor, const struct render_request *request,
-                         const struct render_plan *plan, const struct lut_splat1d *table,
+                         const struct render_plan *plan, const struct lut_splat *table,
                          double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
 {
     memset(time_ms, 0, RENDER_EFFECT_LIMIT * sizeof *time_ms);

@@ -28,7 +28,7 @@ void render_executor_destroy(struct render_executor *executor);
  */
 DIPOLE_CHECKED bool render_executor_run(struct render_executor *executor,
                                         const struct render_request *request,
-                                        const struct render_plan *plan, const struct lut_splat1d *table,
+                                        const struct render_plan *plan, const struct lut_splat *table,
                                         double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status);
 
 /* Copy a texture of the frame's size, RGBA, rows from the top. */

@@ -85,7 +85,7 @@ static bool print_results(const struct cli_tool *tool, const struct options *opt
 /* ---- work --------------------------------------------------------------------------------------- */
 
 static bool draw(const struct cli_tool *tool, const struct options *options, struct renderer *renderer,
-                 struct io_scene *scene, const struct lut_splat1d *table, dipole_status *status)
+                 struct io_scene *scene, const struct lut_splat *table, dipole_status *status)
 {
     const struct render_options drawing = { .technique = (enum render_technique)options->technique,
                                             .epsilon = options->epsilon,
@@ -109,7 +109,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     const enum render_context_kind kind =
         options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
     struct io_scene *scene = NULL;
-    struct lut_splat1d *table = NULL;
+    struct lut_splat *table = NULL;
     struct renderer *renderer = NULL;
     bool is_png;
     const bool done =
@@ -120,7 +120,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
         render_create(scene, kind, &renderer, status) &&
         draw(tool, options, renderer, scene, table, status);
     render_destroy(renderer);
-    lut_splat1d_destroy(table);
+    lut_splat_destroy(table);
     io_scene_destroy(scene);
     return done;
 }

@@ -169,18 +169,27 @@ bool render_plan_check_media(const struct io_scene *scene, dipole_status *status
     return true;
 }
 
-bool render_plan_check_table(const struct lut_splat1d *table, const struct io_material *material,
+bool render_plan_check_table(const struct lut_splat *table, const struct io_material *material,
                              const dipole_place *place, dipole_status *status)
 {
+    const struct io_material *const baked = &table->rows[0].material;
+    const struct lut_hash there = lut_material_hash(baked), here = lut_material_hash(material);
+    if (strcmp(there.text, here.text) == 0)
+        return true;
     int channel;
     double in_table, in_scene;
-    const char *const name = media_difference(&table->material, material, &channel, &in_table, &in_scene);
+    const char *const name = media_difference(baked, material, &channel, &in_table, &in_scene);
     if (!name)
-        return true;
+        return dipole_fail(
+            status, DIPOLE_BAD_VALUE, place,
+            "the table is of another medium than material \"%s\": its model or layers differ "
+            "(material_hash %s, the scene's %s)",
+            material->name, there.text, here.text);
     return dipole_fail(status, DIPOLE_BAD_VALUE, place,
                        "the table is of another medium than material \"%s\": its %s in %s is %.9g, the "
-                       "scene's %.9g",
-                       material->name, name, io_channel_names[channel], in_table, in_scene);
+                       "scene's %.9g (material_hash %s, the scene's %s)",
+                       material->name, name, io_channel_names[channel], in_table, in_scene, there.text,
+                       here.text);
 }
 
 static bool is_lit(const struct io_light *light)
@@ -260,8 +269,8 @@ static void spend_epsilon(const struct render_request *request, struct render_pl
     plan->r_max_mm = worst(plan, dipole_r_max_mm, plan->truncation_epsilon);
     plan->table_error = plan->table_epsilon;
     if (request->table) {
-        plan->r_max_mm = fmin(plan->r_max_mm, request->table->axis.r_max_mm);
-        plan->table_error = request->table->max_relative_error;
+        plan->r_max_mm = fmin(plan->r_max_mm, request->table->rows[0].axis.r_max_mm);
+        plan->table_error = request->table->rows[0].error.max;
     }
     if (plan->r_max_mm >= diameter_mm)
         plan->r_max_mm = diameter_mm; /* every pair of points is near enough: nothing is cut off */

@@ -14,7 +14,7 @@ struct render_frame; /* execute.h */
 /* What is asked. */
 struct render_request {
     const struct io_scene *scene;
-    const struct lut_splat1d *table; /* NULL: one is baked to the plan's table_epsilon */
+    const struct lut_splat *table; /* NULL: one is baked to the plan's table_epsilon */
     double epsilon;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
@@ -142,9 +142,9 @@ void render_plan_destroy(struct render_plan *plan);
 /* Fails unless every object has the same medium with one index; names the two objects. */
 DIPOLE_CHECKED bool render_plan_check_media(const struct io_scene *scene, dipole_status *status);
 
-/* Fails unless the table is of this medium; names the first coefficient that differs. place: the table's
- * file, or NULL. */
-DIPOLE_CHECKED bool render_plan_check_table(const struct lut_splat1d *table,
+/* Fails unless the table is of this medium, by its hash; names the first coefficient that differs. place:
+ * the table's file, or NULL. */
+DIPOLE_CHECKED bool render_plan_check_table(const struct lut_splat *table,
                                             const struct io_material *material, const dipole_place *place,
                                             dipole_status *status);
 

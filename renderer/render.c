@@ -45,7 +45,7 @@ void render_destroy(struct renderer *renderer)
     if (renderer->executor && render_make_current(renderer, NULL))
         render_executor_destroy(renderer->executor);
     render_context_destroy(renderer->context);
-    lut_splat1d_destroy(renderer->table);
+    lut_splat_destroy(renderer->table);
     free(renderer);
 }
 
@@ -58,17 +58,19 @@ bool render_make_current(struct renderer *renderer, dipole_status *status)
 
 /* The table that the plan splats with: the caller's, or one baked now and kept for later calls. */
 static bool table_for(struct renderer *renderer, const struct render_request *request,
-                      const struct render_plan *plan, const struct lut_splat1d **table_out,
+                      const struct render_plan *plan, const struct lut_splat **table_out,
                       dipole_status *status)
 {
     *table_out = request->table;
     if (request->table || !render_plan_reads(plan, "light_samples"))
         return true;
     if (!renderer->table || renderer->table->epsilon > plan->table_epsilon) {
-        lut_splat1d_destroy(renderer->table);
+        lut_splat_destroy(renderer->table);
         renderer->table = NULL;
-        if (!lut_splat1d_bake(&renderer->scene->objects[0].material, plan->table_epsilon, &renderer->table,
-                              status))
+        const struct lut_request wanted = { .materials = &renderer->scene->objects[0].material,
+                                            .material_count = 1,
+                                            .epsilon = plan->table_epsilon };
+        if (!lut_splat_bake(&wanted, &renderer->table, status))
             return false;
     }
     *table_out = renderer->table;
@@ -78,7 +80,7 @@ static bool table_for(struct renderer *renderer, const struct render_request *re
 bool render_run(struct renderer *renderer, const struct render_request *request,
                 struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
 {
-    const struct lut_splat1d *table;
+    const struct lut_splat *table;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
     const bool done = render_plan_create(request, &plan, status) && render_make_current(renderer, status) &&

@@ -43,10 +43,10 @@ void render_destroy(struct renderer *renderer);
 
 struct render_options {
     enum render_technique technique;
-    double epsilon;                  /* 0: RENDER_EPSILON_DEFAULT                              */
-    const struct lut_splat1d *table; /* of the scene's medium; NULL: baked in memory           */
-    bool is_tone_mapped;             /* 0..1 over the scene's background, for a PNG; else
-                                        linear radiance, premultiplied by coverage (alpha)     */
+    double epsilon;                /* 0: RENDER_EPSILON_DEFAULT                              */
+    const struct lut_splat *table; /* of the scene's medium; NULL: baked in memory           */
+    bool is_tone_mapped;           /* 0..1 over the scene's background, for a PNG; else
+                                      linear radiance, premultiplied by coverage (alpha)     */
 };
 
 enum { RENDER_EFFECT_LIMIT = 16, RENDER_NOTE_LIMIT = 4 };

@@ -10,7 +10,7 @@ struct renderer {
     struct render_context *context;
     struct render_gl_errors errors;
     struct render_executor *executor;
-    struct lut_splat1d *table; /* baked when a plan first needed one */
+    struct lut_splat *table; /* baked when a plan first needed one */
 };
 
 DIPOLE_CHECKED bool render_make_current(struct renderer *renderer, dipole_status *status);

@@ -21,42 +21,42 @@ static int select_table(const struct dirent *entry)
 }
 
 /* Keep the better of *best and candidate, end the other. */
-static void keep_better(struct lut_splat1d **best, struct lut_splat1d *candidate)
+static void keep_better(struct lut_splat **best, struct lut_splat *candidate)
 {
-    if (*best && (*best)->max_relative_error <= candidate->max_relative_error) {
-        lut_splat1d_destroy(candidate);
+    if (*best && (*best)->rows[0].error.max <= candidate->rows[0].error.max) {
+        lut_splat_destroy(candidate);
         return;
     }
-    lut_splat1d_destroy(*best);
+    lut_splat_destroy(*best);
     *best = candidate;
 }
 
 /* What the search has seen. */
 struct search {
     const struct io_material *material;
-    struct lut_splat1d *best;
+    struct lut_splat *best;
     dipole_status namesake; /* why a table of the material's name is not it */
 };
 
 static bool look_at(struct search *search, const char *path, dipole_status *status)
 {
     const dipole_place place = { .source = path };
-    struct lut_splat1d *table = NULL;
-    if (!lut_splat1d_read(path, &table, status))
+    struct lut_splat *table = NULL;
+    if (!lut_splat_read(path, &table, status))
         return false;
     dipole_status difference;
     if (render_plan_check_table(table, search->material, &place, &difference)) {
         keep_better(&search->best, table);
         return true;
     }
-    if (strcmp(table->material.name, search->material->name) == 0)
+    if (strcmp(table->rows[0].material.name, search->material->name) == 0)
         search->namesake = difference;
-    lut_splat1d_destroy(table);
+    lut_splat_destroy(table);
     return true;
 }
 
-bool render_table_find(const char *folder, const struct io_material *material,
-                       struct lut_splat1d **table_out, dipole_status *status)
+bool render_table_find(const char *folder, const struct io_material *material, struct lut_splat **table_out,
+                       dipole_status *status)
 {
     const dipole_place place = { .source = folder };
     struct dirent **entries = NULL;
@@ -79,7 +79,7 @@ bool render_table_find(const char *folder, const struct io_material *material,
         *table_out = search.best;
         return true;
     }
-    lut_splat1d_destroy(search.best);
+    lut_splat_destroy(search.best);
     if (done && search.namesake.code != DIPOLE_OK && status)
         *status = search.namesake;
     else if (done)

@@ -154,16 +154,16 @@ static void nothing_else_allocates(void **state)
             (void)dipole_stack_r_max_mm(stack, face, 0.01);
             (void)dipole_stack_splat_spacing_mm(stack, face, 0.01);
         }
+        dipole_sources sources;
+        assert_true(dipole_sources_init(stack, 0.01, 0.1, 2.0, &sources, NULL));
+        assert_true(dipole_sources_between_per_mm2(&sources, origin_mm, normal, origin_mm) > 0.0);
+        assert_true(dipole_sources_within(&sources, -0.1, 1.0) > 0.0);
         assert_int_equal(call_count, 0);
         dipole_stack_destroy(stack);
     }
     dipole_coefficients c;
     dipole_medium medium;
-    dipole_source sources[DIPOLE_SOURCE_LIMIT];
     assert_true(dipole_coefficients_init(&half_space[0].medium, &c, NULL));
-    const size_t count = dipole_sources_init(&c, DIPOLE_MODEL_BEAM, 1e-4, 1e-3, sources, NULL);
-    assert_true(count > 0);
-    assert_true(dipole_rd_between_per_mm2(&c, sources, count, origin_mm, normal, origin_mm) > 0.0);
     assert_true(dipole_medium_from_mean_free_path(0.7, 1.0, 1.3, DIPOLE_FDR_EXACT, DIPOLE_MODEL_BEAM,
                                                   &medium, NULL));
     assert_true(dipole_r_max_mm(&c, 0.01) > 0.0 && dipole_splat_spacing_mm(&c, 0.01) > 0.0);

@@ -4,6 +4,8 @@
 
 #include <fcntl.h>
 #include <locale.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -16,12 +18,14 @@ static struct {
     const char *out;
     double epsilon;
     int technique;
+    unsigned formats;
     int size[2], frames[2];
     struct cli_numbers at;
     struct cli_texts allow;
 } values;
 
 static const char *const techniques[] = { "auto", "splat", "gather", NULL };
+static const char *const formats[] = { "exr", "dds", "raw", "exr2", NULL };
 static const struct cli_option options[] = {
     { .name = "deep", .letter = 'd', .target = &values.deep, .help = "Go deep." },
     { .name = "out",
@@ -44,6 +48,13 @@ static const struct cli_option options[] = {
       .argument = "auto|splat|gather",
       .choices = techniques,
       .help = "How." },
+    { .name = "format",
+      .letter = 'f',
+      .kind = CLI_CHOICES,
+      .target = &values.formats,
+      .argument = "FORMAT,...",
+      .choices = formats,
+      .help = "As what." },
     { .name = "size",
       .kind = CLI_SIZE,
       .target = values.size,
@@ -169,6 +180,33 @@ static void values_arrive(void **state)
     assert_string_equal(operands[0], "--deep");
 }
 
+/* Oracle: a bit for each name, whatever their order; of an option that is repeated the last counts. */
+static void choices_are_bits(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *arguments;
+        unsigned formats;
+    } cases[] = {
+        { "x", 0 },
+        { "x --format exr", 1 },
+        { "x --format raw", 4 },
+        { "x -f raw,exr", 5 },
+        { "x -fdds,exr2,exr,raw", 15 },
+        { "x --format=exr2", 8 }, /* not "exr", with which it begins */
+        { "x --format=dds,dds,dds", 2 },
+        { "x --format exr,dds --format raw", 4 },
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct cli_common common;
+        char **operands;
+        int count;
+        set_arguments(cases[i].arguments);
+        assert_int_equal(parse(&common, &operands, &count), CLI_RUN);
+        assert_int_equal(values.formats, cases[i].formats);
+    }
+}
+
 /* Oracle: a locale with decimal commas changes nothing. */
 static void numbers_do_not_follow_the_locale(void **state)
 {
@@ -212,6 +250,22 @@ static void wrong_usage_is_one_line_and_code_2(void **state)
         { "a --epsilon 1e999", "tool: --epsilon is \"1e999\", expected a number 1e-06 to 0.5\n" },
         { "a --epsilon 0,1", "tool: --epsilon is \"0,1\", expected a number 1e-06 to 0.5\n" },
         { "a --technique magic", "tool: --technique is \"magic\", expected one of auto, splat, gather\n" },
+        { "a --format ex", "tool: --format is \"ex\", expected one of exr, dds, raw, exr2, or several with "
+                           "commas between\n" },
+        { "a --format exr22", "tool: --format is \"exr22\", expected one of exr, dds, raw, exr2, or "
+                              "several with commas between\n" },
+        { "a --format EXR", "tool: --format is \"EXR\", expected one of exr, dds, raw, exr2, or several "
+                            "with commas between\n" },
+        { "a --format exr,png", "tool: --format is \"png\", expected one of exr, dds, raw, exr2, or "
+                                "several with commas between\n" },
+        { "a --format exr,,dds",
+          "tool: --format is \"\", expected one of exr, dds, raw, exr2, or several with commas between\n" },
+        { "a --format exr,",
+          "tool: --format is \"\", expected one of exr, dds, raw, exr2, or several with commas between\n" },
+        { "a --format ,exr",
+          "tool: --format is \"\", expected one of exr, dds, raw, exr2, or several with commas between\n" },
+        { "a --format=", "tool: --format is empty, expected FORMAT,...\n" },
+        { "a -f", "tool: --format has no value, expected --format FORMAT,...\n" },
         { "a --size 800", "tool: --size is \"800\", expected WIDTHxHEIGHT, each 1 to 16384\n" },
         { "a --size 800x", "tool: --size is \"800x\", expected WIDTHxHEIGHT, each 1 to 16384\n" },
         { "a --size 800x600x3", "tool: --size is \"800x600x3\", expected WIDTHxHEIGHT, each 1 to 16384\n" },
@@ -273,6 +327,8 @@ static void help_is_made_from_the_table(void **state)
                         "                          is asked for (default 0.01, no unit).\n"
                         "      --technique auto|splat|gather\n"
                         "                          How.\n"
+                        "  -f, --format FORMAT,...\n"
+                        "                          As what.\n"
                         "      --size WxH          Pixels.\n"
                         "      --frames A:B        Frames.\n"
                         "      --at R,R            Distances in mm.\n"
@@ -323,6 +379,7 @@ static void man_page_is_roff(void **state)
         ".SH NAME\ntool \\- Does .things and 'more' \\- or not\n",
         ".SH SYNOPSIS\n.B tool\nFILE [OPTIONS]\n.br\n.B tool\n\\-\\-old FILE\n",
         ".TP\n\\fB\\-o\\fR, \\fB\\-\\-out\\fR \\fIFILE\\fR\nWhere to.\n",
+        ".TP\n\\fB\\-f\\fR, \\fB\\-\\-format\\fR \\fIFORMAT,...\\fR\nAs what.\n",
         ".TP\n\\fB\\-\\-man\\fR\n",
         ".nf\n  tool \\-\\-epsilon 0.1 x.json\n.fi\n.PP\nLast \\eone.\n",
         ".SH EXIT STATUS\n",
@@ -441,6 +498,55 @@ static void print_well(void)
     _exit(cli_stdout_finish(NULL) ? 0 : 1);
 }
 
+/* Oracle: wait(2): a signal ends the program and the status names it, as without us; one that was ignored
+ * still is. */
+static void signals_end_the_program_as_before(void **state)
+{
+    (void)state;
+    static const int numbers[] = { SIGHUP, SIGINT, SIGTERM };
+    for (int i = 0; i < 6; i++) {
+        const int number = numbers[i % 3];
+        const bool is_ignored = i >= 3;
+        const pid_t child = fork();
+        if (child == 0) {
+            signal(number, is_ignored ? SIG_IGN : SIG_DFL);
+            cli_start();
+            raise(number);
+            _exit(5);
+        }
+        int result = 0;
+        assert_int_equal(waitpid(child, &result, 0), child);
+        assert_int_equal(WIFSIGNALED(result) ? WTERMSIG(result) : 0, is_ignored ? 0 : number);
+        assert_true(!is_ignored || WEXITSTATUS(result) == 5);
+    }
+}
+
+static void *raise_term(void *unused)
+{
+    raise(SIGTERM);
+    for (;;)
+        pause();
+    return unused;
+}
+
+/* Oracle: as above, when another thread than the main one gets the signal. */
+static void signals_to_any_thread_end_the_program(void **state)
+{
+    (void)state;
+    const pid_t child = fork();
+    if (child == 0) {
+        pthread_t thread;
+        cli_start();
+        if (pthread_create(&thread, NULL, raise_term, NULL) != 0)
+            _exit(5);
+        pthread_join(thread, NULL);
+        _exit(6);
+    }
+    int result = 0;
+    assert_int_equal(waitpid(child, &result, 0), child);
+    assert_true(WIFSIGNALED(result) && WTERMSIG(result) == SIGTERM);
+}
+
 /* Oracle: what could not be printed is a failure, not a signal and not success. */
 static void lost_output_is_a_failure(void **state)
 {
@@ -457,6 +563,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(values_arrive),
+        cmocka_unit_test(choices_are_bits),
         cmocka_unit_test(numbers_do_not_follow_the_locale),
         cmocka_unit_test(wrong_usage_is_one_line_and_code_2),
         cmocka_unit_test(too_many_numbers_are_refused),
@@ -467,6 +574,8 @@ int main(void)
         cmocka_unit_test(a_report_names_the_place),
         cmocka_unit_test(notes_are_quietened_and_progress_needs_a_terminal),
         cmocka_unit_test(progress_is_drawn_on_a_terminal),
+        cmocka_unit_test(signals_end_the_program_as_before),
+        cmocka_unit_test(signals_to_any_thread_end_the_program),
         cmocka_unit_test(lost_output_is_a_failure),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Oracle: the documents themselves. Every T-number cited in the code stands in docs/theory.md, and the README's
-# examples run as they are printed.
+# Oracle: the documents themselves. Every T-number cited in the code stands in docs/theory.md, quoted code is that of
+# its files, and the README's examples run as they are printed.
 # usage: test_docs.sh SOURCE PROGRAMS WORK
 set -eu
 source_folder=$1
@@ -22,6 +22,13 @@ for path in $(grep -ohE '\]\((docs|materials|scenes)/[^)]*\)' README.md | sed 's
 done
 echo '[       OK ] what the README links to exists'
 
+# the GLSL in docs/engines.md is that of the files, in their order
+cat lutgen/glsl/splat.glsl lutgen/glsl/tsm.glsl >"$work/files.glsl"
+awk '/^```/ { inside = /^```glsl$/; next } inside' docs/engines.md >"$work/quoted.glsl"
+cmp "$work/files.glsl" "$work/quoted.glsl" ||
+    { echo '[  FAILED  ] docs/engines.md does not quote lutgen/glsl as it is'; exit 1; }
+echo '[       OK ] docs/engines.md quotes lutgen/glsl as it is'
+
 # a window needs a display: test_window has that
 grep '^    build/release/bin/' README.md | grep -v -e '--view' >"$work/examples"
 ln -s "$source_folder/materials" "$source_folder/scenes" "$source_folder/tests" "$work/"
@@ -34,4 +41,4 @@ for file in marble.svg models.svg skin.svg tables/marble.splat1d.exr knot.png kn
     [ -s "$file" ] || { echo "[  FAILED  ] the README's examples made no $file"; exit 1; }
 done
 echo "[       OK ] the README's examples run"
-echo '[  PASSED  ] 3 test(s).'
+echo '[  PASSED  ] 4 test(s).'

@@ -221,6 +221,230 @@ static void a_reader_never_sees_half_a_file(void **state)
     assert_int_equal(entry_count("."), 1);
 }
 
+/* ---- checked writing -------------------------------------------------------------------------------- */
+
+enum { CHECKED_SIZE = 100003 };
+
+/* What a check saw, and what it shall say. */
+struct watch {
+    const char *folder;     /* of the file that is written                    */
+    const char *old;        /* what stands there under its name; NULL: nothing */
+    const char *path;       /* the name it shall have                          */
+    const char *data;       /* CHECKED_SIZE bytes that are written             */
+    const char *message;    /* NULL: passes; else what is wrong with the file  */
+    const char *own_source; /* or with another one                             */
+    int calls;
+};
+
+static bool watch_file(void *context, const char *path, dipole_status *status)
+{
+    struct watch *const watch = context;
+    char *data;
+    size_t size;
+    watch->calls++;
+    assert_string_not_equal(path, watch->path);
+    assert_int_equal(strncmp(path, watch->folder, strlen(watch->folder)), 0);
+    assert_null(strchr(path + strlen(watch->folder) + 1, '/'));
+    assert_true(io_file_read(path, CHECKED_SIZE, &data, &size, NULL));
+    assert_int_equal(size, CHECKED_SIZE);
+    assert_memory_equal(data, watch->data, size);
+    free(data);
+    if (watch->old)
+        expect_file(watch->path, watch->old);
+    else
+        assert_int_equal(access(watch->path, F_OK), -1);
+    const dipole_place place = { .source = watch->own_source ? watch->own_source : path, .line = 3 };
+    return !watch->message || dipole_fail(status, DIPOLE_BAD_VALUE, &place, "%s", watch->message);
+}
+
+/* Oracle: the bytes that are written; while they are looked at, the name still has the old ones. */
+static void a_check_sees_the_whole_file_before_it_has_its_name(void **state)
+{
+    (void)state;
+    static char data[CHECKED_SIZE];
+    struct rng rng = { .seed = 8 };
+    for (size_t i = 0; i < sizeof data; i++)
+        data[i] = (char)random_bits(&rng);
+    assert_int_equal(mkdir("folder", 0700), 0);
+    struct watch watches[] = { { .folder = "folder", .path = "folder/file" },
+                               { .folder = "folder", .path = "folder/file" },
+                               { .folder = ".", .path = "file" } };
+    watches[1].old = "old";
+    for (size_t i = 0; i < 3; i++) {
+        struct watch *const watch = &watches[i];
+        watch->data = data;
+        if (watch->old)
+            put_file(watch->path, watch->old);
+        assert_true(io_file_write_checked(watch->path, data, sizeof data, watch_file, watch, NULL));
+        assert_int_equal(watch->calls, 1);
+        char *found;
+        size_t size;
+        assert_true(io_file_read(watch->path, sizeof data, &found, &size, NULL));
+        assert_int_equal(size, sizeof data);
+        assert_memory_equal(found, data, size);
+        free(found);
+        assert_int_equal(entry_count("folder"), 1);
+    }
+    assert_int_equal(entry_count("."), 2);
+}
+
+/* Oracle: the folder as it was, and the check's own words, about the file's own name: nobody has heard of
+ * the other one. Without a status all is the same. */
+static void a_check_that_refuses_leaves_all_as_it_was(void **state)
+{
+    (void)state;
+    static char data[CHECKED_SIZE];
+    char long_path[400] = "";
+    while (strlen(long_path) < 300) {
+        strcat(long_path, "a_long_folder_name/");
+        assert_int_equal(mkdir(long_path, 0700), 0);
+    }
+    strcat(long_path, "file");
+    const char *const paths[] = { "file", "./file", "new", long_path };
+    put_file("file", "old");
+    for (size_t i = 0; i < 4; i++) {
+        const size_t length = strrchr(paths[i], '/') ? (size_t)(strrchr(paths[i], '/') - paths[i]) : 0;
+        char folder[400] = ".";
+        if (length > 0)
+            snprintf(folder, sizeof folder, "%.*s", (int)length, paths[i]);
+        for (int k = 0; k < 3; k++) {
+            struct watch watch = { .folder = folder,
+                                   .old = i < 2 ? "old" : NULL,
+                                   .path = paths[i],
+                                   .data = data,
+                                   .message = "is not good enough",
+                                   .own_source = k == 1 ? "another" : NULL };
+            dipole_status status = { 0 };
+            assert_false(io_file_write_checked(paths[i], data, sizeof data, watch_file, &watch,
+                                               k == 2 ? NULL : &status));
+            assert_int_equal(watch.calls, 1);
+            if (k == 2)
+                continue;
+            char expected[sizeof status.source];
+            snprintf(expected, sizeof expected, "%s", k == 1 ? "another" : paths[i]);
+            assert_int_equal(status.code, DIPOLE_BAD_VALUE);
+            assert_string_equal(status.source, expected);
+            assert_int_equal(status.line, 3);
+            assert_string_equal(status.message, "is not good enough");
+        }
+        assert_int_equal(entry_count(folder), i < 3 ? 2 : 0);
+    }
+    expect_file("file", "old");
+}
+
+static bool never_called(void *context, const char *path, dipole_status *status)
+{
+    (void)path;
+    (void)status;
+    *(bool *)context = true;
+    return true;
+}
+
+/* Oracle: where nothing can be written nothing is looked at; a device has no bytes that could be. Without a
+ * check it is io_file_write. */
+static void a_check_is_for_files_that_were_written(void **state)
+{
+    (void)state;
+    bool was_called = false;
+    dipole_status status;
+    struct stat info;
+    assert_int_equal(mkdir("folder", 0700), 0);
+    assert_int_equal(symlink("/dev/null", "null"), 0);
+    assert_false(io_file_write_checked("missing/file", "x", 1, never_called, &was_called, &status));
+    assert_string_equal(status.source, "missing/file");
+    assert_true(io_file_write_checked("null", "x", 1, never_called, &was_called, NULL));
+    assert_false(was_called);
+    assert_int_equal(stat("null", &info), 0);
+    assert_true(S_ISCHR(info.st_mode));
+    assert_false(io_file_write_checked("folder", "x", 1, never_called, &was_called, &status));
+    assert_string_equal(status.source, "folder");
+    assert_string_equal(status.message, "cannot be written: Is a directory");
+    assert_true(io_file_write_checked("file", "text", 4, NULL, NULL, &status));
+    expect_file("file", "text");
+    assert_int_equal(entry_count("."), 3);
+}
+
+/* ---- signals ---------------------------------------------------------------------------------------- */
+
+static bool wait_for_ever(void *context, const char *path, dipole_status *status)
+{
+    (void)path;
+    (void)status;
+    if (write(*(int *)context, "x", 1) == 1)
+        for (;;)
+            pause();
+    return false;
+}
+
+static void remove_and_exit(int number)
+{
+    (void)number;
+    io_file_remove_temporaries(); /* NOLINT(bugprone-signal-handler): made for it */
+    _exit(7);
+}
+
+/* Oracle: the folder; whatever moment a signal comes, its handler leaves one whole version and nothing
+ * else. */
+static void a_signal_leaves_no_temporary(void **state)
+{
+    (void)state;
+    enum { SIZE = 300000, ROUNDS = 100 };
+    static char block[SIZE];
+    struct rng rng = { .seed = 5 };
+    assert_true(io_file_write("file", block, SIZE, NULL));
+    for (int i = 0; i < ROUNDS; i++) {
+        const pid_t child = fork();
+        if (child == 0) {
+            signal(SIGTERM, remove_and_exit);
+            for (int k = 0;; k++) {
+                memset(block, k, SIZE);
+                if (!io_file_write("file", block, SIZE, NULL))
+                    _exit(1);
+            }
+        }
+        usleep((useconds_t)log_uniform(&rng, 500, 5000));
+        kill(child, SIGTERM);
+        int result = 0;
+        waitpid(child, &result, 0);
+        assert_true((WIFEXITED(result) && WEXITSTATUS(result) == 7) || WTERMSIG(result) == SIGTERM);
+        char *data;
+        size_t size;
+        assert_true(io_file_read("file", SIZE, &data, &size, NULL));
+        assert_int_equal(size, SIZE);
+        assert_memory_equal(data, data + 1, SIZE - 1);
+        free(data);
+        assert_int_equal(entry_count("."), 1);
+    }
+    io_file_remove_temporaries(); /* nothing is being written: nothing goes */
+    assert_int_equal(entry_count("."), 1);
+}
+
+/* Oracle: as above, while a check is under way. */
+static void a_signal_during_a_check_leaves_no_temporary(void **state)
+{
+    (void)state;
+    int ends[2], result = 0;
+    char byte;
+    put_file("file", "old");
+    assert_int_equal(pipe(ends), 0);
+    const pid_t child = fork();
+    if (child == 0) {
+        signal(SIGTERM, remove_and_exit);
+        _exit(io_file_write_checked("file", "new", 3, wait_for_ever, &ends[1], NULL) ? 1 : 2);
+    }
+    assert_int_equal(read(ends[0], &byte, 1), 1);
+    assert_int_equal(entry_count("."), 2);
+    kill(child, SIGTERM);
+    waitpid(child, &result, 0);
+    assert_true(WIFEXITED(result) && WEXITSTATUS(result) == 7);
+    assert_int_equal(entry_count("."), 1);
+    expect_file("file", "old");
+    close(ends[0]);
+    close(ends[1]);
+}
+
+/* ---- places ----------------------------------------------------------------------------------------- */
+
 /* Oracle: io_file_write's own verdict on the same path. */
 static void check_writable_foretells_write(void **state)
 {
@@ -348,6 +572,11 @@ int main(void)
         in_empty_folder(a_full_disk_leaves_the_old_file),
         in_empty_folder(a_device_is_written_to_and_not_replaced),
         in_empty_folder(a_reader_never_sees_half_a_file),
+        in_empty_folder(a_check_sees_the_whole_file_before_it_has_its_name),
+        in_empty_folder(a_check_that_refuses_leaves_all_as_it_was),
+        in_empty_folder(a_check_is_for_files_that_were_written),
+        in_empty_folder(a_signal_leaves_no_temporary),
+        in_empty_folder(a_signal_during_a_check_leaves_no_temporary),
         in_empty_folder(check_writable_foretells_write),
         in_empty_folder(folders_are_made_with_their_parents),
         in_empty_folder(references_stay_under_their_folder),

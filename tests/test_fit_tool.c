@@ -182,8 +182,9 @@ static void a_coarse_picture_is_taken_at_its_word(void **state)
     assert_int_equal(run.exit_code, 0);
     struct io_image *image;
     assert_true(io_exr_read("coarse.exr", &image, NULL));
-    image->attribute_count = 0;
-    assert_true(io_exr_write("silent.exr", image, false, NULL));
+    struct io_image silent_image = *image; /* without attributes */
+    silent_image.attribute_count = 0;
+    assert_true(io_exr_write("silent.exr", &silent_image, false, NULL));
     io_image_destroy(image);
     json_t *const stated = fit_knot(&run, "coarse.exr"), *const silent = fit_knot(&run, "silent.exr");
     struct io_material truth;

@@ -640,11 +640,11 @@ static void fresnel_in_glsl_is_that_of_the_library(void **state)
     scene_end(&test);
 }
 
-static const struct lut_splat1d *strip_table;
+static struct lut_axis strip_axis;
 
 static void bind_table(GLuint program)
 {
-    const struct lut_axis *const axis = &strip_table->axis;
+    const struct lut_axis *const axis = &strip_axis;
     const double end = axis->r_max_mm / axis->scale_mm;
     render_set_int(program, "profile_table", 0);
     render_set_int(program, "profile_last_node", axis->node_count - 1);
@@ -670,12 +670,22 @@ static void profile_in_glsl_is_that_of_the_table(void **state)
     init_lit(&test, IO_PRIMITIVE_CUBE, 5, false, &material);
     struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
     assert_true(render_make_current(renderer, NULL));
-    struct lut_splat1d *table;
-    assert_true(lut_splat1d_bake(&material, 0.001, &table, NULL));
-    strip_table = table;
+    struct lut_splat *table;
+    assert_true(lut_splat_bake(
+        &(struct lut_request){ .materials = &material, .material_count = 1, .epsilon = 0.001 }, &table,
+        NULL));
+    strip_axis = render_bands_axis(table);
+    static float nodes[3 * 8193];
+    assert_true(strip_axis.node_count <= 8193);
+    for (int i = 0; i < strip_axis.node_count; i++) {
+        double rgb[3];
+        lut_splat_sample(table, 0, fmin(lut_axis_r_mm(&strip_axis, i), strip_axis.r_max_mm), rgb);
+        for (int c = 0; c < 3; c++)
+            nodes[3 * i + c] = (float)rgb[c];
+    }
     GLuint buffer, texture;
     glCreateBuffers(1, &buffer);
-    glNamedBufferStorage(buffer, table->axis.node_count * 12, table->rgb, 0);
+    glNamedBufferStorage(buffer, strip_axis.node_count * 12, nodes, 0);
     glCreateTextures(GL_TEXTURE_BUFFER, 1, &texture);
     glTextureBuffer(texture, GL_RGB32F, buffer);
     static float rgba[4 * STRIP_PX];
@@ -684,11 +694,13 @@ static void profile_in_glsl_is_that_of_the_table(void **state)
     glDeleteBuffers(1, &buffer);
     for (int i = 0; i < STRIP_PX; i++) {
         double expected[3];
-        lut_splat1d_sample(table, (double)rgba[4 * i + 3], expected);
+        lut_splat_sample(table, 0, (double)rgba[4 * i + 3], expected);
         for (int c = 0; c < 3; c++)
-            assert_close((double)rgba[4 * i + c], expected[c], 2e-4, "texel %d, channel %d", i, c);
+            /* a float keeps 1e-7 of the logarithm, times the nodes, times what the profile falls from node
+             * to node */
+            assert_close((double)rgba[4 * i + c], expected[c], 5e-4, "texel %d, channel %d", i, c);
     }
-    lut_splat1d_destroy(table);
+    lut_splat_destroy(table);
     render_destroy(renderer);
     scene_end(&test);
 }

@@ -110,17 +110,20 @@ static void record_dipole(struct record *record, const dipole_coefficients *c)
     add_value(record, dipole_splat_spacing_mm(c, 0.01));
 }
 
-static void record_between(struct record *record, const dipole_coefficients *c)
+static void record_between(struct record *record, const dipole_stack *stack)
 {
     static const double in_mm[3] = { 0.0, 0.0, 0.0 }, normal[3] = { 0.0, 0.6, 0.8 },
-                        out_mm[3] = { 1.0, 0.5, -0.2 };
-    for (int is_beam = 0; is_beam < 2; is_beam++) {
-        dipole_source sources[DIPOLE_SOURCE_LIMIT];
-        const size_t count = dipole_sources_init(c, is_beam ? DIPOLE_MODEL_BEAM : DIPOLE_MODEL_DIPOLE, 1e-4,
-                                                 1e-3, sources, NULL);
-        add(record, sources, count * sizeof *sources);
-        add_value(record, dipole_rd_between_per_mm2(c, sources, count, in_mm, normal, out_mm));
-    }
+                        out_mm[3] = { 1.0, 0.5, -0.2 }, cosines[3] = { -1.0, 0.1, 0.7 };
+    dipole_sources sources;
+    if (!dipole_sources_init(stack, 0.01, 0.1, 3.0, &sources, NULL))
+        return;
+    double values[3];
+    add(record, sources.at, sources.count * sizeof sources.at[0]);
+    add_value(record, sources.max_relative_error);
+    add_value(record, dipole_sources_between_per_mm2(&sources, in_mm, normal, out_mm));
+    dipole_sources_profile_per_mm2(&sources, 1.0, cosines, 3, values);
+    add(record, values, sizeof values);
+    add_value(record, dipole_sources_within(&sources, -0.2, 1.0));
 }
 
 static void record_inversions(struct record *record)
@@ -172,6 +175,7 @@ static void record_stack(struct record *record, const dipole_stack *stack)
     }
     record_face(record, stack, DIPOLE_FACE_LIT);
     record_face(record, stack, DIPOLE_FACE_FAR);
+    record_between(record, stack);
 }
 
 /* Everything that dipole.h offers, on what all threads share. */
@@ -180,7 +184,6 @@ static void record_all(struct record *record, dipole_stack *const *stacks)
     record->count = 0;
     record_fresnel(record);
     record_dipole(record, dipole_stack_coefficients(stacks[0], 0));
-    record_between(record, dipole_stack_coefficients(stacks[0], 0));
     record_inversions(record);
     for (size_t k = 0; k < COUNT(kinds); k++)
         record_stack(record, stacks[k]);
