@@ -1,7 +1,7 @@
 #include "lutgen/parallel.h"
 
+#include <pthread.h> /* and not C11 threads, which the thread sanitizer does not know */
 #include <stdatomic.h>
-#include <threads.h>
 #include <unistd.h>
 
 enum { THREAD_LIMIT = 64 };
@@ -13,12 +13,12 @@ struct loop {
     atomic_int next;
 };
 
-static int work(void *argument)
+static void *work(void *argument)
 {
     struct loop *const loop = argument;
     for (int i = atomic_fetch_add(&loop->next, 1); i < loop->count; i = atomic_fetch_add(&loop->next, 1))
         loop->body(loop->context, i);
-    return 0;
+    return NULL;
 }
 
 void lut_parallel_for(int count, int thread_count, void (*body)(void *context, int index), void *context)
@@ -26,12 +26,12 @@ void lut_parallel_for(int count, int thread_count, void (*body)(void *context, i
     struct loop loop = { .count = count, .body = body, .context = context };
     const long processors = thread_count > 0 ? thread_count : sysconf(_SC_NPROCESSORS_ONLN);
     const int wanted = (int)(processors < THREAD_LIMIT ? processors : THREAD_LIMIT);
-    thrd_t threads[THREAD_LIMIT];
+    pthread_t threads[THREAD_LIMIT];
     int started = 0;
     while (started < wanted - 1 && started < count - 1 &&
-           thrd_create(&threads[started], work, &loop) == thrd_success)
+           pthread_create(&threads[started], NULL, work, &loop) == 0)
         started++;
     work(&loop);
     for (int i = 0; i < started; i++)
-        thrd_join(threads[i], NULL);
+        pthread_join(threads[i], NULL);
 }
