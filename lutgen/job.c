@@ -92,7 +92,7 @@ static bool exr_is_current(struct lut_job *job, const char *hash)
     return is_current;
 }
 
-/* Only an EXR file can be read back as a table; without one the others are made anew, which costs a bake.
+/* Only an EXR file can be read back as a table; without one it is baked, and then compared: lut_job_write.
  */
 void lut_job_find_current(struct lut_job *job)
 {
@@ -218,13 +218,27 @@ static bool format_write(struct lut_job *job, enum lut_format format, dipole_sta
     return io_raw_write(path, job->image, job->depth, is_half, status);
 }
 
+static bool is_left(const struct lut_job *job, enum lut_format format)
+{
+    char path[sizeof job->stem + 16];
+    lut_job_path(job, format, path, sizeof path);
+    return !job->is_forced && format != LUT_EXR &&
+           io_sidecar_is_current(path, job->image, job->depth, job->request.is_half);
+}
+
 bool lut_job_write(struct lut_job *job, dipole_status *status)
 {
     if (!(job->formats >> LUT_EXR & 1U) && !image_audit(job, job->image, job->stem, status))
         return false;
-    for (int i = 0; i < LUT_FORMAT_COUNT; i++)
-        if ((job->formats >> i & 1U) && !format_write(job, (enum lut_format)i, status))
+    job->is_current = true;
+    for (int i = 0; i < LUT_FORMAT_COUNT; i++) {
+        const enum lut_format format = (enum lut_format)i;
+        if (!(job->formats >> i & 1U) || is_left(job, format))
+            continue;
+        job->is_current = false;
+        if (!format_write(job, format, status))
             return false;
+    }
     return true;
 }
 

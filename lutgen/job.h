@@ -12,7 +12,7 @@ struct lut_job {
     const char *source; /* the material's file, for messages; NULL when there are several */
     char stem[4096];    /* path of the files without the format's ending                  */
     unsigned formats;   /* bit i for lut_format i                                         */
-    bool is_plotted;
+    bool is_plotted, is_forced;
     int thread_count;
 
     /* After lut_job_find_current or lut_job_bake: */
@@ -30,7 +30,8 @@ void lut_job_find_current(struct lut_job *job);
 /* Bake in memory. Fails with the material's file, or as lut_splat_bake and lut_tsm_bake do. */
 DIPOLE_CHECKED bool lut_job_bake(struct lut_job *job, dipole_status *status);
 
-/* Write all files; an EXR file is read back and audited before it gets its name. */
+/* Write all files; an EXR file is read back and audited before it gets its name. Others that hold the same
+ * bytes already are left as they are, unless is_forced: engines import again what has a new date. */
 DIPOLE_CHECKED bool lut_job_write(struct lut_job *job, dipole_status *status);
 
 /* Write DIR/NAME.KIND.svg: curves, or the contact sheet of a volume. */

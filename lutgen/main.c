@@ -87,6 +87,7 @@ static bool job_add(const struct options *options, struct batch *batch, enum lut
         .source = kind == LUT_SPLAT2D ? NULL : batch->paths[first],
         .formats = options->formats,
         .is_plotted = options->is_plotted,
+        .is_forced = options->is_forced,
         .thread_count = (int)options->thread_count,
     };
     if (kind == LUT_TSM)

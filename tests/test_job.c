@@ -121,6 +121,31 @@ static void a_second_run_touches_nothing(void **state)
     json_decref(first);
 }
 
+/* Oracle: the files' bytes, times and inode numbers. Without an EXR file a table is baked to be compared,
+ * but what holds the same bytes keeps its date. */
+static void files_of_other_formats_keep_their_dates(void **state)
+{
+    (void)state;
+    static const char *const arguments[] = { MARBLE,     "-o",      "out", "--kind", "splat1d,tsm",
+                                             "--format", "dds,raw", NULL,  NULL };
+    const char *forced[sizeof arguments / sizeof *arguments];
+    memcpy(forced, arguments, sizeof arguments);
+    forced[7] = "--force";
+    json_decref(bake(&run, arguments));
+    struct folder before;
+    folder_read(&before);
+    assert_int_equal(before.count, 2 * 4);
+    for (int round = 0; round < 2; round++) {
+        json_t *const again = bake(&run, round == 0 ? arguments : forced);
+        assert_int_equal(json_array_size(again), 4);
+        for (size_t i = 0; i < 4; i++)
+            assert_true(file_is_current(again, i) == (round == 0));
+        expect_same_entries(&before, round == 0);
+        json_decref(again);
+    }
+    folder_free(&before);
+}
+
 /* Oracle: a run in peace. Threads, the folder's name, the file's place and what does not decide the bytes
  * leave a table alone; what it does not know of stays, too. */
 static void what_does_not_matter_is_left_alone(void **state)
@@ -425,9 +450,10 @@ static int free_run(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        tool_test(a_second_run_touches_nothing),   tool_test(what_does_not_matter_is_left_alone),
-        tool_test(another_request_is_baked_anew),  tool_test(a_damaged_table_is_baked_anew),
-        tool_test(a_changed_attribute_is_noticed), tool_test(files_beside_are_looked_at_too),
+        tool_test(a_second_run_touches_nothing),       tool_test(files_of_other_formats_keep_their_dates),
+        tool_test(what_does_not_matter_is_left_alone), tool_test(another_request_is_baked_anew),
+        tool_test(a_damaged_table_is_baked_anew),      tool_test(a_changed_attribute_is_noticed),
+        tool_test(files_beside_are_looked_at_too),
     };
     return cmocka_run_group_tests(tests, NULL, free_run);
 }
