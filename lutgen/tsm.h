@@ -66,7 +66,7 @@ struct lut_tsm_plan {
     double *r_mm; /* different ones: those of the inner cells first, one more that is infinite */
     int radius_count, inner_radius_count;
     dipole_sources sources[IO_CHANNEL_COUNT];
-    double floor_per_mm2[IO_CHANNEL_COUNT], flat_inner_power[IO_CHANNEL_COUNT]; /* the latter at dz = 0 */
+    double flat_inner_power[IO_CHANNEL_COUNT]; /* of the five inner cells at dz = 0 */
     struct lut_profile profiles[IO_CHANNEL_COUNT];
 };
 
@@ -86,8 +86,8 @@ void lut_tsm_work_end(struct lut_tsm_work *work);
 
 /*
  * work->means: the mean response of each class of cells where the surface of the light's entry lies across
- * the light, dz above the point. What falls beyond the last ring is added to it, so that the sum over all
- * cells is all the light that arrives.
+ * the light, dz above the point; negative where it is lost in rounding. What falls beyond the last ring is
+ * added to it, so that the sum over all cells is all the light that arrives.
  */
 void lut_tsm_means_find(const struct lut_tsm_plan *plan, int channel, double dz_mm,
                         const struct lut_tsm_work *work);

@@ -85,7 +85,8 @@ static void depth_audit(const struct audit *audit, int round, uint64_t *random, 
                              audit->kind == LUT_AUDIT_T ? AT_NODE : off_grid, random, work, errors);
 }
 
-/* The same of the local response's depth factor, relative to the whole response, too. */
+/* The same of the local response's depth factor: relative to the whole response of the inner square, or to
+ * R_d(r_max) where that is more. */
 static void local_audit(const struct audit *audit, int round, double *errors)
 {
     const struct lut_tsm_plan *const plan = audit->plan;
@@ -97,8 +98,10 @@ static void local_audit(const struct audit *audit, int round, double *errors)
             continue;
         double sampled[IO_CHANNEL_COUNT];
         const double whole = lut_tsm_inner_part(plan, c, dz_mm, &audit->works[round]);
+        const double least =
+            plan->profiles[c].floor_per_mm2 * lut->inner_mm * lut->inner_mm / plan->flat_inner_power[c];
         lut_tsm_local_depth_factor(lut, dz_mm, sampled);
-        *errors++ = fabs(sampled[c] - lut_tsm_proximity(lut, dz_mm) * whole) / whole;
+        *errors++ = fabs(sampled[c] - lut_tsm_proximity(lut, dz_mm) * whole) / fmax(whole, least);
     }
 }
 

@@ -104,7 +104,7 @@ static void classes_find(struct lut_tsm_plan *plan)
     plan->r_mm[plan->radius_count] = INFINITY;
 }
 
-/* Of one cell. Far out the sum of turns leaves a rounding of the total. */
+/* Of one cell. Far out the sum of turns leaves a rounding of the total: see power_rounding. */
 static double class_power(const struct lut_tsm_plan *plan, const struct lut_cell_class *class,
                           const double *within)
 {
@@ -114,6 +114,9 @@ static double class_power(const struct lut_tsm_plan *plan, const struct lut_cell
     return fmax(power, 0);
 }
 
+/* Of the total: powers below it are noise. */
+static const double power_rounding = 1e-13;
+
 void lut_tsm_means_find(const struct lut_tsm_plan *plan, int channel, double dz_mm,
                         const struct lut_tsm_work *work)
 {
@@ -121,17 +124,18 @@ void lut_tsm_means_find(const struct lut_tsm_plan *plan, int channel, double dz_
     const double inner_area = plan->lut->inner_mm * plan->lut->inner_mm;
     dipole_sources_within_many(&plan->sources[channel], -dz_mm, plan->r_mm, (size_t)plan->radius_count + 1,
                                within);
+    const double noise = power_rounding * within[plan->radius_count];
     double rest = within[plan->radius_count], outermost = 0;
     for (int k = 0; k < plan->class_count; k++) {
         const struct lut_cell_class *const class = &plan->classes[k];
         const double power = class_power(plan, class, within);
-        means[k] = power / (class->cell.area * inner_area);
+        means[k] = power > noise ? power / (class->cell.area * inner_area) : -1;
         outermost += class->cell.is_outermost ? power * class->member_count : 0;
         rest -= power * class->member_count;
     }
-    for (int k = 0; k < plan->class_count && outermost > 0; k++)
+    for (int k = 0; k < plan->class_count && outermost > noise && rest > noise; k++)
         if (plan->classes[k].cell.is_outermost)
-            means[k] *= 1 + fmax(rest, 0) / outermost;
+            means[k] *= 1 + rest / outermost;
 }
 
 static double inner_power(const struct lut_tsm_plan *plan, int channel, double dz_mm,
@@ -152,7 +156,7 @@ double lut_tsm_inner_part(const struct lut_tsm_plan *plan, int channel, double d
 }
 
 /* The response at the cell's centre, by the distance to the sources, times mean over centre where the
- * surface lies across the light. */
+ * surface lies across the light; times 1 where the mean is lost in noise. */
 void lut_tsm_response(const struct lut_tsm_plan *plan, int channel, int sample, double dz_mm, size_t count,
                       const struct lut_tsm_work *work)
 {
@@ -164,7 +168,7 @@ void lut_tsm_response(const struct lut_tsm_plan *plan, int channel, int sample, 
     dipole_sources_profile_per_mm2(&plan->sources[channel], distance, work->cosines, count + 1,
                                    work->values);
     const double mean = work->means[channel * plan->class_count + k];
-    const double factor = work->values[count] > 0 ? mean / work->values[count] : 0;
+    const double factor = mean < 0 ? 1 : work->values[count] > 0 ? mean / work->values[count] : 0;
     for (size_t i = 0; i < count; i++)
         work->values[i] *= factor;
 }
@@ -184,7 +188,7 @@ static double kernel_mean(const struct lut_tsm_plan *plan, int channel, int i, i
     dipole_sources_within_many(&plan->sources[channel], 0, r_mm, (size_t)count, within);
     for (int k = 0; k < count; k++)
         power += weight[k] * within[k];
-    return power / (cell_mm * cell_mm);
+    return fmax(power, 0) / (cell_mm * cell_mm); /* as in class_power */
 }
 
 /* Cells are each other's mirror images in eight ways. */
@@ -270,7 +274,6 @@ static bool sources_find(struct lut_tsm_plan *plan, dipole_status *status)
         if (!dipole_sources_init(profile->stack, epsilon, r_min_mm, r_max_mm, &plan->sources[c], &why))
             return dipole_fail(status, why.code, NULL, "channel %s: %s", io_channel_names[c], why.message);
         lut->source_error = fmax(lut->source_error, plan->sources[c].max_relative_error);
-        plan->floor_per_mm2[c] = profile->floor_per_mm2;
     }
     return true;
 }
