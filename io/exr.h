@@ -19,7 +19,7 @@ struct io_attribute {
 };
 
 /* Most attributes of an image, and longest text of one in bytes. */
-enum { IO_IMAGE_MAX_CHANNELS = 4, IO_IMAGE_MAX_ATTRIBUTES = 256, IO_IMAGE_TEXT_LIMIT = 256 * 1024 };
+enum { IO_IMAGE_MAX_CHANNELS = 4, IO_IMAGE_MAX_ATTRIBUTES = 256, IO_IMAGE_TEXT_LIMIT = 4 << 20 };
 
 /* A picture in memory: height x width x channel_count floats, rows from the top, channels interleaved
  * R, G, B [, A]. End it with io_image_destroy. */

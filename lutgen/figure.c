@@ -79,8 +79,7 @@ static struct plot plot_of(const struct lut_splat *lut, const struct plot_series
                  lut->node_count);
     snprintf(caption, 512,
              "As the table gives it back, interpolated between its texels%s. Stored in %s. Largest "
-             "relative error "
-             "%.2g, %.2g were asked.%s",
+             "relative error %.2g, %.2g were asked.%s",
              lut->node_count <= NODE_LIMIT ? " (circles; the first, at r = 0, is not shown)" : "",
              lut->is_half ? "half" : "float", worst, lut->epsilon,
              lut->row_count > ROW_LIMIT ? " Only the first materials are drawn." : "");

@@ -15,9 +15,6 @@
  * which leaves the most range below; 1 for max = 0. */
 double lut_half_scale(double max);
 
-/* The half nearest to value, ties to even; |value| at most 65504. */
-double lut_half_round(double value);
-
 /* What every kind asks of a request. */
 DIPOLE_CHECKED bool lut_request_check(const struct lut_request *request, dipole_status *status);
 
@@ -127,7 +124,7 @@ double lut_random(uint64_t *state);
 
 /* ---- errors ------------------------------------------------------------------------------------- */
 
-/* Reorders errors (count > 0, none NaN). */
+/* Reorders errors (count > 0); NaN counts as infinite. */
 struct lut_error lut_error_of(double *errors, size_t count);
 
 #endif

@@ -81,8 +81,6 @@ static bool exr_is_current(struct lut_job *job, const char *hash)
                             table_from_image(job, image, path, &table, NULL);
     if (is_current) {
         job->error = table_error(&table);
-        job->width = image->width_px;
-        job->height = image->height_px;
         job->depth = table.tsm ? table.tsm->size[2] : 1;
         job->image = image;
         image = NULL;
@@ -133,11 +131,8 @@ static bool bake(struct lut_job *job, dipole_status *status)
         job->depth = 1;
         is_done = is_done && lut_splat_to_image(table.splat, job->request.kind, &job->image, status);
     }
-    if (is_done) {
+    if (is_done)
         job->error = table_error(&table);
-        job->width = job->image->width_px;
-        job->height = job->image->height_px;
-    }
     table_end(&table);
     return is_done;
 }

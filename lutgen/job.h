@@ -16,9 +16,9 @@ struct lut_job {
     int thread_count;
 
     /* After lut_job_find_current or lut_job_bake: */
-    bool is_current;          /* the files were there, made of the same inputs, and whole */
-    struct io_image *image;   /* NULL where the files were there without an EXR file among them */
-    int width, height, depth; /* texels of the picture; depth: of its slices, side by side      */
+    bool is_current; /* the files were there, made of the same inputs, and whole */
+    struct io_image *image;
+    int depth; /* slices side by side in the image */
     struct lut_error error;
     double bake_ms;
 };

@@ -47,7 +47,8 @@ static bool size_parse(struct options *options, dipole_status *status)
 {
     int size[3], end = 0;
     const char *const text = options->size_text;
-    const bool has_volume = (options->kinds >> LUT_TSM & 1U) != 0, has_splat = (options->kinds & 3U) != 0;
+    const bool has_volume = (options->kinds >> LUT_TSM & 1U) != 0,
+               has_splat = (options->kinds & ~(1U << LUT_TSM)) != 0;
     if (!text)
         return true;
     if (sscanf(text, "%5dx%5dx%5d%n", &size[0], &size[1], &size[2], &end) == 3 && text[end] == '\0') {
@@ -165,7 +166,7 @@ static bool batch_run(const struct cli_tool *tool, const struct options *options
 /* A number of texels, or [width, rows], or [S, T, R]. */
 static json_t *size_to_json(const struct lut_job *job)
 {
-    const int width = job->width, height = job->height;
+    const int width = job->image->width_px, height = job->image->height_px;
     switch (job->request.kind) {
     case LUT_SPLAT2D:
         return json_pack("[ii]", width, height);
@@ -213,7 +214,7 @@ static bool print_json(const struct batch *batch, dipole_status *status)
 
 static void size_to_text(const struct lut_job *job, char out[48])
 {
-    const int width = job->width, height = job->height;
+    const int width = job->image->width_px, height = job->image->height_px;
     if (job->request.kind == LUT_TSM)
         snprintf(out, 48, "%dx%dx%d", width / job->depth, height, job->depth);
     else if (job->request.kind == LUT_SPLAT2D)
@@ -289,26 +290,25 @@ int main(int argc, char **argv)
           .min = LUT_EPSILON_MIN,
           .max = LUT_EPSILON_MAX,
           .help = "Largest relative error of a table; 1e-6 to 0.5, default 0.001, of tsm 0.15. A splat "
-                  "table ends "
-                  "where as much of the light is left." },
+                  "table ends where as much of the light is left." },
         { .name = "kind",
           .letter = 'k',
           .kind = CLI_CHOICES,
           .target = &options.kinds,
           .argument = "KIND,...",
           .choices = lut_kind_names,
-          .help = "Kinds of table, with commas between: splat1d (a row of texels), splat2d (one table with "
-                  "a row for "
-                  "each material), tsm (a volume for translucent shadow maps); default splat1d." },
+          .help =
+              "Kinds of table, with commas between: splat1d (a row of texels), splat2d (one table with "
+              "a row for each material), tsm (a volume for translucent shadow maps); default splat1d." },
         { .name = "format",
           .letter = 'f',
           .kind = CLI_CHOICES,
           .target = &options.formats,
           .argument = "FORMAT,...",
           .choices = lut_format_names,
-          .help = "Kinds of file, with commas between: exr (attributes inside), dds (DX10 texture or "
-                  "volume) or raw "
-                  "(bare numbers), each of the latter with a .json beside it; default exr." },
+          .help =
+              "Kinds of file, with commas between: exr (attributes inside), dds (DX10 texture or "
+              "volume) or raw (bare numbers), each of the latter with a .json beside it; default exr." },
         { .name = "half",
           .kind = CLI_FLAG,
           .target = &options.is_half,
@@ -319,9 +319,8 @@ int main(int argc, char **argv)
           .target = &options.size_text,
           .argument = "N|SxTxR",
           .help = "Texels of a splat table (8 to 32768; default: the fewest that keep epsilon), or of a "
-                  "volume (S, T 8 "
-                  "to 1024, R 16, 32, 64, 128 or 256; default: 64x64x32, S and T doubled until epsilon is "
-                  "kept)." },
+                  "volume (S, T 8 to 1024, R 16, 32, 64, 128 or 256; default: 64x64x32, S and T doubled "
+                  "until epsilon is kept)." },
         { .name = "force",
           .kind = CLI_FLAG,
           .target = &options.is_forced,
@@ -346,13 +345,10 @@ int main(int argc, char **argv)
         .usage = "MATERIAL.json... -o DIR",
         .details =
             "Each material becomes DIR/NAME.splat1d.exr: R_d(r) for R, G and B along one row of texels, "
-            "from r = 0 "
-            "to r_max; DIR/NAME.tsm.exr: slices of a volume side by side; all materials together become "
-            "DIR/materials.splat2d.exr. Mappings of the axes, coefficients and measured errors stand in "
-            "attributes "
-            "that begin with dipole:. A table is read back and audited before it gets its name, and left "
-            "alone when "
-            "it is there already, baked from the same inputs.",
+            "from r = 0 to r_max; DIR/NAME.tsm.exr: slices of a volume side by side; all materials "
+            "together become DIR/materials.splat2d.exr. Mappings of the axes, coefficients and measured "
+            "errors stand in attributes that begin with dipole:. A table is read back and audited before "
+            "it gets its name, and left alone when it is there already, baked from the same inputs.",
         .options = table,
         .operand_min = 1,
         .operand_max = INT_MAX,

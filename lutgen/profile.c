@@ -197,7 +197,9 @@ struct lut_error lut_error_of(double *errors, size_t count)
 {
     assert(count > 0);
     double most = 0;
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
+        errors[i] = isnan(errors[i]) ? INFINITY : errors[i]; /* no value is the worst one */
         most = fmax(most, errors[i]);
+    }
     return (struct lut_error){ .max = most, .p99 = select_at(errors, count, (count * 99 + 99) / 100 - 1) };
 }

@@ -1,4 +1,5 @@
 /* Splat tables in memory: nodes, what lies between them, and the audit. T15. */
+#include "io/half.h"
 #include "lutgen/internal.h"
 
 #include <assert.h>
@@ -59,9 +60,9 @@ bool lut_splat_row_bake(struct lut_splat_row *row, const struct lut_profile prof
         row->core_mm[c] = profiles[c].core_mm;
         row->scale[c] = is_half ? lut_half_scale(most) : 1;
         for (int i = 0; i < row->axis.node_count; i++) {
-            const double stored = fmax(values[2 * (size_t)i], 0) / row->scale[c];
+            const float stored = (float)(fmax(values[2 * (size_t)i], 0) / row->scale[c]);
             rgb[(size_t)i * IO_CHANNEL_COUNT + (size_t)c] =
-                (float)(is_half ? lut_half_round(stored) : stored);
+                is_half ? io_float_from_half(io_half_from_float(stored)) : stored;
         }
     }
     free(work);
@@ -127,7 +128,7 @@ static bool row_audit(const struct lut_splat_row *row, const float *rgb,
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
             const size_t at = (size_t)c * count + i;
             const double difference = fabs(sampled[c] - exact[at]);
-            errors[at] = difference > 0 ? difference / fmax(exact[at], profiles[c].floor_per_mm2) : 0;
+            errors[at] = difference == 0 ? 0 : difference / fmax(exact[at], profiles[c].floor_per_mm2);
         }
     }
     *error_out = lut_error_of(errors, IO_CHANNEL_COUNT * count);

@@ -124,8 +124,8 @@ static struct lut_error errors_sum(const struct audit *audit, size_t count)
     struct lut_error error = { 0 };
     if (of_volume > 0)
         error = lut_error_of(audit->errors, of_volume);
-    for (size_t i = of_volume; i < count; i++)
-        error.max = fmax(error.max, audit->errors[i]);
+    if (count > of_volume)
+        error.max = fmax(error.max, lut_error_of(audit->errors + of_volume, count - of_volume).max);
     return error;
 }
 

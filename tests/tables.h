@@ -4,6 +4,7 @@
 
 #include "tests/check.h"
 
+#include "io/half.h"
 #include "lutgen/internal.h"
 
 #include <stdlib.h>
@@ -43,6 +44,11 @@ static inline struct io_material make_material(double sigma_a, double sigma_s_pr
                                    .eta = 1.3 };
     io_material_set_media(&material, (const dipole_medium[]){ medium, medium, medium });
     return material;
+}
+
+static inline bool is_half(float value)
+{
+    return io_float_from_half(io_half_from_float(value)) == value;
 }
 
 static inline dipole_stack *stack_of(const struct io_material *material, int channel)

@@ -281,8 +281,8 @@ static void too_much_in_the_header_is_refused(void **state)
     (void)state;
     char *const longer = long_text(IO_IMAGE_TEXT_LIMIT + 1);
     const char *const messages[] = {
-        "attribute dipole:a is too much, expected at most 256 of at most 262144 bytes",
-        "attribute dipole:0 is too much, expected at most 256 of at most 262144 bytes"
+        "attribute dipole:a is too much, expected at most 256 of at most 4194304 bytes",
+        "attribute dipole:0 is too much, expected at most 256 of at most 4194304 bytes"
     };
     for (int i = 0; i < 2; i++) {
         struct io_image *image = random_image(3, 2, 3, 1);

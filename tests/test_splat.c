@@ -501,21 +501,58 @@ static void the_material_that_fails_is_named(void **state)
     assert_not_baked(&request, DIPOLE_BAD_VALUE, "1025 materials, expected 1 to 1024");
 }
 
-/* ---- half --------------------------------------------------------------------------------------- */
+/* ---- audits that see all ------------------------------------------------------------------------- */
 
-/* Oracle: the binary16 format. */
-static void half_rounds_to_nearest_even(void **state)
+/* Oracle: no value is the worst one; a single texel that is no number makes the error infinite. */
+static void a_texel_that_is_no_number_is_an_error(void **state)
 {
     (void)state;
-    assert_true(lut_half_round(1 + 0x1p-11) == 1);
-    assert_true(lut_half_round(1 + 3 * 0x1p-11) == 1 + 0x1p-9);
-    assert_true(lut_half_round(1 + 0x1p-11 + 0x1p-30) == 1 + 0x1p-10);
-    assert_true(lut_half_round(65504 + 15.9) == 65504);
-    assert_true(lut_half_round(2047.5) == 2048);
-    assert_true(lut_half_round(0x1p-14 * (1 + 0x1p-11)) == 0x1p-14);
-    assert_true(lut_half_round(0x1p-24 * 2.4) == 0x1p-23);
-    assert_true(lut_half_round(0x1p-26) == 0);
-    assert_true(lut_half_round(0) == 0);
+    double errors[] = { 0.1, (double)NAN, 0.2 };
+    assert_true(isinf(lut_error_of(errors, 3).max));
+    const struct io_material material = read_bundled("marble", 1);
+    struct lut_splat *const lut = bake(&material, 0.01, false);
+    struct lut_error error;
+    lut->rgb[3 * 5 + 1] = NAN;
+    assert_true(lut_splat_audit(lut, 0, 8, 3, &error, NULL));
+    assert_true(isinf(error.max));
+    lut_splat_destroy(lut);
+}
+
+/* Oracle: each row's own name. As many rows as there may be, with their descriptions, go through a picture.
+ */
+static void as_many_rows_as_promised_fit_into_a_file(void **state)
+{
+    (void)state;
+    struct io_material *const materials = calloc(LUT_ROW_LIMIT, sizeof *materials);
+    assert_non_null(materials);
+    for (int i = 0; i < LUT_ROW_LIMIT; i++) {
+        materials[i] = read_bundled("marble", 1);
+        snprintf(materials[i].name, sizeof materials[i].name, "marble %d", i);
+    }
+    const struct lut_request request = {
+        .kind = LUT_SPLAT2D, .materials = materials, .material_count = LUT_ROW_LIMIT, .epsilon = 0.1
+    };
+    struct lut_splat *lut = NULL, *back = NULL;
+    struct io_image *image = NULL;
+    dipole_status status = { 0 };
+    if (!lut_splat_bake(&request, &lut, &status) ||
+        !lut_splat_to_image(lut, LUT_SPLAT2D, &image, &status) ||
+        !lut_splat_from_image(image, "many.exr", &back, &status))
+        fail_msg("%s", status.message);
+    for (int i = 0; i < LUT_ROW_LIMIT; i++)
+        assert_string_equal(back->rows[i].material.name, materials[i].name);
+    io_image_destroy(image);
+    lut_splat_destroy(lut);
+    lut_splat_destroy(back);
+    free(materials);
+}
+
+/* ---- half --------------------------------------------------------------------------------------- */
+
+/* Oracle: half's largest value and powers of two. */
+static void half_scales_fill_the_range(void **state)
+{
+    (void)state;
     struct rng rng = { .seed = 6 };
     for (int i = 0; i < 1000; i++) {
         const double max = log_uniform(&rng, 1e-30, 1e30);
@@ -547,7 +584,7 @@ static void texels_of_a_half_table_are_halves(void **state)
         struct lut_splat *const lut = bake(&material, 0.001, true);
         for (int i = 0; i < 3 * lut->node_count; i++) {
             const double value = (double)lut->rgb[i];
-            assert_true(value >= 0 && value <= 65504 && lut_half_round(value) == value);
+            assert_true(value >= 0 && value <= 65504 && is_half(lut->rgb[i]));
         }
         lut_splat_destroy(lut);
     }
@@ -623,7 +660,9 @@ int main(void)
         cmocka_unit_test(layers_bake),
         cmocka_unit_test(rows_are_what_each_material_is_alone),
         cmocka_unit_test(the_material_that_fails_is_named),
-        cmocka_unit_test(half_rounds_to_nearest_even),
+        cmocka_unit_test(a_texel_that_is_no_number_is_an_error),
+        cmocka_unit_test(as_many_rows_as_promised_fit_into_a_file),
+        cmocka_unit_test(half_scales_fill_the_range),
         cmocka_unit_test(half_is_refused_where_it_cannot_hold),
         cmocka_unit_test(texels_of_a_half_table_are_halves),
         cmocka_unit_test(what_float_cannot_hold_is_refused),
