@@ -15,11 +15,11 @@
 
 /*
  * Draw the scene as render_draw does, without OpenGL. Samples are doubled until their error, estimated from
- * two independent halves as the largest over the channels of the relative RMSE over the picture, is at most
- * RENDER_REFERENCE_SHARE options->epsilon, and they are nearer to each other than the shortest mean free
- * path. options->technique and table are not looked at. *report_out may be NULL. Memory: 96 bytes a pixel,
- * 32 a triangle beside Embree's, 16 MB for samples, whatever their number. Fails with DIPOLE_BAD_VALUE,
- * DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED; *image_out is then NULL.
+ * two halves and from the sum before as the largest over the channels of the relative RMSE over the
+ * picture, is at most RENDER_REFERENCE_SHARE options->epsilon, and they are nearer to each other than the
+ * shortest mean free path. options->technique and table are not looked at. *report_out may be NULL. Memory:
+ * 88 bytes a pixel, 64 a triangle beside Embree's, 50 MB for samples, whatever their number. Fails with
+ * DIPOLE_BAD_VALUE, DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED; *image_out is then NULL.
  */
 DIPOLE_CHECKED bool render_reference_draw(const struct io_scene *scene,
                                           const struct render_options *options, struct io_image **image_out,
