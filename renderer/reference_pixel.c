@@ -49,8 +49,9 @@ void render_pixel_trace(const struct render_pixel_view *view, int x, int y, stru
 {
     pixel->group_count = pixel->hit_count = 0;
     for (int i = 0; i < RENDER_PIXEL_RAYS; i++) {
-        const double x_px = x + (i % RENDER_PIXEL_SIDE + 0.5) / RENDER_PIXEL_SIDE;
-        const double y_px = y + (i / RENDER_PIXEL_SIDE + 0.5) / RENDER_PIXEL_SIDE;
+        const int column = i % RENDER_PIXEL_SIDE, line = i / RENDER_PIXEL_SIDE;
+        const double x_px = x + (column + 0.5) / RENDER_PIXEL_SIDE;
+        const double y_px = y + (line + 0.5) / RENDER_PIXEL_SIDE;
         double origin_mm[3], direction[3];
         struct render_surface_point hit;
         camera_ray(view->plan, x_px, y_px, origin_mm, direction);

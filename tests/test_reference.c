@@ -29,8 +29,8 @@ static struct io_image *draw_splats(const struct test_scene *test, const struct 
                                     bool is_masked)
 {
     struct renderer *renderer;
-    struct io_image *image;
-    struct render_capture *captured;
+    struct io_image *image = NULL;
+    struct render_capture *captured = NULL;
     dipole_status status;
     if (!render_create(&test->scene, RENDER_CONTEXT_DEFAULT, &renderer, &status) ||
         !render_draw(renderer, options, &image, NULL, &status) ||
@@ -249,7 +249,7 @@ static void shadows_fall_where_they_should(void **state)
 /* ---- pictures ----------------------------------------------------------------------------------- */
 
 /* Oracle: conservation of energy. What leaves at the middle of a wide slab is the closed-form diffuse
- * reflectance of what enters; the slab's end, r_max(1e-4), and the estimated error, 2e-4, leave less than
+ * reflectance of what enters; the slab's end, r_max(1e-4), and the estimated error, 4e-4, leave less than
  * 1e-3. */
 static void energy_is_conserved(void **state)
 {
@@ -270,7 +270,7 @@ static void energy_is_conserved(void **state)
                                             .width_px = 2,
                                             .height_px = 2 };
     struct render_report report;
-    struct io_image *const image = draw(&test, &(struct render_options){ .epsilon = 0.002 }, &report);
+    struct io_image *const image = draw(&test, &(struct render_options){ .epsilon = 0.004 }, &report);
     assert_int_equal(report.note_count, 0);
     const double leaving = 1 - dipole_fresnel_reflectance(1.3, 1);
     for (int i = 0; i < 2 * 2 * 4; i++) {
@@ -325,8 +325,8 @@ static void a_sphere_equals_another_quadrature(void **state)
     scene_end(&test);
 }
 
-/* Oracle: a picture that is several times as exact. The error is no more than estimated, and falls at least as
- * fast as the root of the number of samples. */
+/* Oracle: a picture that is several times as exact. The error is no more than estimated, and falls at least
+ * as fast as the root of the number of samples. */
 static void errors_fall_and_are_estimated(void **state)
 {
     (void)state;
