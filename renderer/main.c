@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 #include "renderer/output.h"
 #include "renderer/plan.h"
+#include "renderer/reference.h"
 #include "renderer/tables.h"
 #include "renderer/view.h"
 
@@ -57,10 +58,14 @@ static void print_plan(const struct render_report *report)
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);
     }
-    printf("%-14s  %-6s  %9s  reason\n%-14s  %-6s  %9s\n", "effect", "active", "time", "", "", "ms");
+    if (report->doubling_count > 0)
+        printf("%12s  estimated error\n", "samples");
+    for (size_t i = 0; i < report->doubling_count; i++)
+        printf("%12zu  %.3g\n", report->doublings[i].sample_count, report->doublings[i].error);
+    printf("%-16s  %-6s  %9s  reason\n%-16s  %-6s  %9s\n", "effect", "active", "time", "", "", "ms");
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        printf("%-14s  %-6s  %9.1f  %s\n", effect->name, effect->is_active ? "yes" : "no", effect->time_ms,
+        printf("%-16s  %-6s  %9.1f  %s\n", effect->name, effect->is_active ? "yes" : "no", effect->time_ms,
                effect->reason);
     }
 }
@@ -99,6 +104,47 @@ static bool draw(const struct cli_tool *tool, const struct options *options, str
            print_results(tool, options, &report, status);
 }
 
+static void show_progress(void *context, const char *what, double fraction)
+{
+    cli_progress_show(context, what, fraction);
+}
+
+/* Without OpenGL: works where there is none. */
+static bool draw_reference(const struct cli_tool *tool, const struct options *options,
+                           const struct io_scene *scene, bool is_png, dipole_status *status)
+{
+    struct cli_progress progress;
+    cli_progress_start(&progress, tool, &options->common);
+    const struct render_options drawing = { .technique = RENDER_TECHNIQUE_REFERENCE,
+                                            .epsilon = options->epsilon,
+                                            .is_tone_mapped = is_png,
+                                            .progress = { .show = show_progress, .context = &progress } };
+    struct io_image *image = NULL;
+    struct render_report report;
+    const bool done = render_reference_draw(scene, &drawing, &image, &report, status) &&
+                      render_output_save(options->output_path, image, status) &&
+                      print_results(tool, options, &report, status);
+    io_image_destroy(image);
+    return done;
+}
+
+static bool draw_by_opengl(const struct cli_tool *tool, const struct options *options,
+                           struct io_scene *scene, dipole_status *status)
+{
+    const enum render_context_kind kind =
+        options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
+    struct lut_splat *table = NULL;
+    struct renderer *renderer = NULL;
+    const bool done =
+        (!options->table_folder ||
+         render_table_find(options->table_folder, &scene->objects[0].material, &table, status)) &&
+        render_create(scene, kind, &renderer, status) &&
+        draw(tool, options, renderer, scene, table, status);
+    render_destroy(renderer);
+    lut_splat_destroy(table);
+    return done;
+}
+
 static bool run(const struct cli_tool *tool, const struct options *options, const char *scene_path,
                 dipole_status *status)
 {
@@ -106,21 +152,13 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                                               .allowed_path_count = options->allowed_paths.count,
                                               .width_px = options->size_px[0],
                                               .height_px = options->size_px[1] };
-    const enum render_context_kind kind =
-        options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
     struct io_scene *scene = NULL;
-    struct lut_splat *table = NULL;
-    struct renderer *renderer = NULL;
-    bool is_png;
-    const bool done =
-        (!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
-        io_scene_read(scene_path, &reading, &scene, status) && render_plan_check_media(scene, status) &&
-        (!options->table_folder ||
-         render_table_find(options->table_folder, &scene->objects[0].material, &table, status)) &&
-        render_create(scene, kind, &renderer, status) &&
-        draw(tool, options, renderer, scene, table, status);
-    render_destroy(renderer);
-    lut_splat_destroy(table);
+    bool is_png = false, done = false;
+    if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
+        io_scene_read(scene_path, &reading, &scene, status) && render_plan_check_media(scene, status))
+        done = options->technique == RENDER_TECHNIQUE_REFERENCE
+                   ? draw_reference(tool, options, scene, is_png, status)
+                   : draw_by_opengl(tool, options, scene, status);
     io_scene_destroy(scene);
     return done;
 }
@@ -148,7 +186,9 @@ int main(int argc, char **argv)
           .target = &options.technique,
           .argument = "NAME",
           .help = "splat: subsurface scattering; lambert: light leaves where it enters; auto: splat, or "
-                  "lambert where scattering stays within a pixel. Default auto.",
+                  "lambert where scattering stays within a pixel; reference: the integral over the surface "
+                  "on the "
+                  "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
         { .name = "epsilon",
           .letter = 'e',
@@ -214,6 +254,11 @@ int main(int argc, char **argv)
     }
     if (!options.output_path && !options.is_viewed) {
         dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "no --output (-o) IMG was given; try --help");
+        return cli_report(&tool, &status, EXIT_USAGE);
+    }
+    if (options.technique == RENDER_TECHNIQUE_REFERENCE && (options.is_viewed || options.table_folder)) {
+        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "--technique reference cannot be used with %s",
+                    options.is_viewed ? "--view" : "--luts");
         return cli_report(&tool, &status, EXIT_USAGE);
     }
     if (!run(&tool, &options, operands[0], &status))

@@ -44,7 +44,7 @@ enum {
 /* A point light this wide or less, seen from it, gets one view; a wider scene six. */
 #define SINGLE_VIEW_ANGLE_RAD (100 * PI / 180)
 
-const char *const render_technique_names[] = { "auto", "splat", "lambert", NULL };
+const char *const render_technique_names[] = { "auto", "splat", "lambert", "reference", NULL };
 
 /* Every texture of the renderer. */
 static const struct render_texture textures[] = {
@@ -192,13 +192,13 @@ bool render_plan_check_table(const struct lut_splat *table, const struct io_mate
                        here.text);
 }
 
-static bool is_lit(const struct io_light *light)
+bool render_light_shines(const struct io_light *light)
 {
     return light->rgb[0] > 0 || light->rgb[1] > 0 || light->rgb[2] > 0;
 }
 
-static bool read_scene(const struct render_request *request, struct render_plan *plan,
-                       dipole_status *status)
+bool render_plan_read_scene(const struct render_request *request, struct render_plan *plan,
+                            dipole_status *status)
 {
     const struct io_scene *const scene = request->scene;
     const struct io_camera *const camera = &scene->camera;
@@ -229,7 +229,7 @@ static bool read_scene(const struct render_request *request, struct render_plan 
     for (size_t i = 0; i < scene->object_count; i++)
         plan->has_specular |= scene->objects[i].has_specular;
     for (size_t i = 0; i < scene->light_count; i++)
-        plan->lit_count += is_lit(&scene->lights[i]);
+        plan->lit_count += render_light_shines(&scene->lights[i]);
     plan->epsilon = request->epsilon;
     plan->width_px = camera->width_px;
     plan->height_px = camera->height_px;
@@ -430,7 +430,7 @@ static bool make_views(const struct render_request *request, struct render_plan 
                            plan->lit_count);
     double widest_mm = plan->spacing_mm;
     for (size_t i = 0; i < scene->light_count; i++) {
-        if (!is_lit(&scene->lights[i]))
+        if (!render_light_shines(&scene->lights[i]))
             continue;
         struct render_plan_view *const view = &plan->views[plan->view_count];
         if (scene->lights[i].kind == IO_LIGHT_POINT) {
@@ -592,7 +592,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
     struct render_plan *const plan = calloc(1, sizeof *plan);
     if (!plan)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a plan");
-    bool done = read_scene(request, plan, status);
+    bool done = render_plan_read_scene(request, plan, status);
     if (done) {
         spend_epsilon(request, plan);
         choose_technique(request, plan);

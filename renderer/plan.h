@@ -139,6 +139,14 @@ DIPOLE_CHECKED bool render_plan_create(const struct render_request *request, str
                                        dipole_status *status);
 void render_plan_destroy(struct render_plan *plan);
 
+/* The first part of a plan, all that the reference needs: what the scene says, checked (media, lights,
+ * camera); neither budget nor views nor passes. Owns nothing then. */
+DIPOLE_CHECKED bool render_plan_read_scene(const struct render_request *request, struct render_plan *plan,
+                                           dipole_status *status);
+
+/* Whether a light is not black. */
+bool render_light_shines(const struct io_light *light);
+
 /* Fails unless every object has the same medium with one index; names the two objects. */
 DIPOLE_CHECKED bool render_plan_check_media(const struct io_scene *scene, dipole_status *status);
 

@@ -2,6 +2,7 @@
 
 #include "renderer/context.h"
 #include "renderer/execute.h"
+#include "renderer/reference.h"
 #include "renderer/renderer.h"
 
 #include <math.h>
@@ -143,6 +144,8 @@ static void set_attributes(struct io_image *image, const struct io_scene *scene,
 bool render_draw(struct renderer *renderer, const struct render_options *options,
                  struct io_image **image_out, struct render_report *report_out, dipole_status *status)
 {
+    if (options->technique == RENDER_TECHNIQUE_REFERENCE)
+        return render_reference_draw(renderer->scene, options, image_out, report_out, status);
     const double start_ms = now_ms();
     const struct render_request request = {
         .scene = renderer->scene,

@@ -15,9 +15,15 @@ enum render_context_kind {
     RENDER_CONTEXT_WINDOW, /* GLFW, hidden; needs a display */
 };
 
-/* The default takes splats, or Lambert where scattering stays within a pixel. */
-enum render_technique { RENDER_TECHNIQUE_AUTO = 0, RENDER_TECHNIQUE_SPLAT, RENDER_TECHNIQUE_LAMBERT };
-extern const char *const render_technique_names[]; /* "auto", "splat", "lambert", NULL */
+/* The default takes splats, or Lambert where scattering stays within a pixel. The reference (reference.h)
+ * is slow and exact, and needs no OpenGL. */
+enum render_technique {
+    RENDER_TECHNIQUE_AUTO = 0,
+    RENDER_TECHNIQUE_SPLAT,
+    RENDER_TECHNIQUE_LAMBERT,
+    RENDER_TECHNIQUE_REFERENCE,
+};
+extern const char *const render_technique_names[]; /* "auto", "splat", "lambert", "reference", NULL */
 
 /* epsilon: asked relative error of the radiosity. */
 #define RENDER_EPSILON_DEFAULT 0.01
@@ -41,15 +47,32 @@ DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_cont
                                   struct renderer **renderer_out, dipole_status *status);
 void render_destroy(struct renderer *renderer);
 
+/* Called now and then with the part that is done, 0 to 1, from the thread that draws. */
+struct render_progress {
+    void (*show)(void *context, const char *what, double fraction); /* NULL: nobody watches */
+    void *context;
+};
+
 struct render_options {
     enum render_technique technique;
     double epsilon;                /* 0: RENDER_EPSILON_DEFAULT                              */
     const struct lut_splat *table; /* of the scene's medium; NULL: baked in memory           */
     bool is_tone_mapped;           /* 0..1 over the scene's background, for a PNG; else
                                       linear radiance, premultiplied by coverage (alpha)     */
+
+    /* Of the reference alone. */
+    struct render_progress progress;
+    int thread_count;    /* 0: as many as processors; the picture does not depend on it */
+    size_t sample_limit; /* 0: RENDER_REFERENCE_SAMPLE_LIMIT                            */
 };
 
-enum { RENDER_EFFECT_LIMIT = 16, RENDER_NOTE_LIMIT = 4 };
+enum { RENDER_EFFECT_LIMIT = 16, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
+
+/* One step of the reference: surface samples so far, and the error estimated from them. */
+struct render_doubling {
+    size_t sample_count;
+    double error;
+};
 
 struct render_effect_report {
     const char *name;
@@ -62,7 +85,7 @@ struct render_effect_report {
 struct render_report {
     enum render_technique technique; /* never AUTO */
     double epsilon;
-    double error_predicted; /* the sum of these four */
+    double error_predicted; /* the sum of these four; of the reference estimated */
     double truncation_error, aliasing_error, banding_error, table_error;
     double r_max_mm, spacing_mm; /* 0 when not splatted */
     size_t sample_count;         /* at the finest */
@@ -70,6 +93,8 @@ struct render_report {
     int band_count;
     struct render_effect_report effects[RENDER_EFFECT_LIMIT];
     size_t effect_count;
+    struct render_doubling doublings[RENDER_DOUBLING_LIMIT]; /* of the reference */
+    size_t doubling_count;
     double total_ms;
     char notes[RENDER_NOTE_LIMIT][256]; /* promises that could not be kept */
     size_t note_count;

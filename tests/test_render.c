@@ -1,6 +1,7 @@
 /* renderer/render.h: pictures against sums and integrals that were not drawn. */
 #include "check.h"
 #include "scenes.h"
+#include "sphere_oracle.h"
 
 #include "renderer/gl.h"
 #include "renderer/render.h"
@@ -154,34 +155,6 @@ static void splats_are_near_the_sum_without_a_cut(void **state)
 
 /* ---- integrals ---------------------------------------------------------------------------------- */
 
-enum { QUADRATURE_POINTS = 30000 };
-
-/* Radiosity at a point of a sphere lit from the direction -toward_light, channel by channel: the integral
- * over the lit hemisphere on a Fibonacci lattice, which is uniform in area to better than 0.1 %. */
-static void sphere_radiosity(const float position_mm[3], double radius_mm, const double toward_light[3],
-                             double irradiance, const dipole_coefficients k[3], double radiosity[3])
-{
-    const double golden_rad = PI * (3 - sqrt(5));
-    const double area_mm2 = 4 * PI * radius_mm * radius_mm / QUADRATURE_POINTS;
-    memset(radiosity, 0, 3 * sizeof *radiosity);
-    for (int i = 0; i < QUADRATURE_POINTS; i++) {
-        const double z = 1 - (2 * i + 1.0) / QUADRATURE_POINTS, rho = sqrt(1 - z * z);
-        const double n[3] = { rho * cos(golden_rad * i), rho * sin(golden_rad * i), z };
-        const double cosine = n[0] * toward_light[0] + n[1] * toward_light[1] + n[2] * toward_light[2];
-        if (cosine <= 0)
-            continue;
-        const double flux_w =
-            irradiance * cosine * area_mm2 * (1 - dipole_fresnel_reflectance(k[0].eta, cosine));
-        double r2 = 0;
-        for (int a = 0; a < 3; a++) {
-            const double d = (double)position_mm[a] - radius_mm * n[a];
-            r2 += d * d;
-        }
-        for (int c = 0; c < 3; c++)
-            radiosity[c] += flux_w * dipole_rd_per_mm2(&k[c], sqrt(r2));
-    }
-}
-
 /* Oracle: the surface integral over the sphere, by a quadrature that knows neither light view nor mesh. */
 static void splats_approach_the_surface_integral(void **state)
 {
@@ -206,8 +179,9 @@ static void splats_approach_the_surface_integral(void **state)
             double radiosity[3];
             if (captured->coverage[i] < 1)
                 continue;
-            sphere_radiosity(captured->position_mm + 3 * i, radius_mm, toward_light, test.lights[0].rgb[0],
-                             k, radiosity);
+            const float *const p = captured->position_mm + 3 * i;
+            const double position_mm[3] = { (double)p[0], (double)p[1], (double)p[2] };
+            sphere_radiosity(position_mm, radius_mm, toward_light, test.lights[0].rgb[0], k, radiosity);
             for (int c = 0; c < 3; c++)
                 deviation_add(&deviation, (double)image->pixels[4 * i + (size_t)c],
                               (double)captured->exit_per_sr[i] * radiosity[c]);

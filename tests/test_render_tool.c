@@ -156,7 +156,7 @@ static void wrong_usage_is_code_2(void **state)
     (void)state;
     fails_with(RENDER " sphere.json", 2, "render: no --output (-o) IMG was given; try --help\n");
     fails_with(RENDER " sphere.json -o bad.exr --technique tsm", 2,
-               "render: --technique is \"tsm\", expected one of auto, splat, lambert\n");
+               "render: --technique is \"tsm\", expected one of auto, splat, lambert, reference\n");
     fails_with(RENDER " sphere.json -o bad.exr --context glx", 2,
                "render: --context is \"glx\", expected one of osmesa, egl, window\n");
     char out[4096], err[4096];
@@ -211,7 +211,7 @@ static void results_are_told_as_promised(void **state)
     assert_int_equal(
         run(RENDER " sphere.json -o b.exr --explain --size 32x24 -t lambert", out, err, sizeof err), 0);
     assert_non_null(strstr(out, "technique lambert, epsilon 0.01\n"));
-    assert_non_null(strstr(out, "splat           no            0.0  technique is lambert\n"));
+    assert_non_null(strstr(out, "splat             no            0.0  technique is lambert\n"));
     assert_non_null(strstr(out, "b.exr: lambert, epsilon 0.01, "));
 }
 
