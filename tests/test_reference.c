@@ -374,11 +374,11 @@ static void splats_are_near_the_reference(void **state)
             scene_add_directional(&test, 1, -1, -1, 3);
             scene_add_point(&test, 12, 4, 9, 200);
         }
-        test.scene.camera.width_px = 80;
-        test.scene.camera.height_px = 60;
+        test.scene.camera.width_px = 64;
+        test.scene.camera.height_px = 48;
         struct io_image *const splats = draw_splats(
             &test, &(struct render_options){ .technique = RENDER_TECHNIQUE_SPLAT, .epsilon = 0.005 }, true);
-        const double pixel_mm = test.scene.camera.height_mm / 60;
+        const double pixel_mm = test.scene.camera.height_mm / 48;
         test.scene.camera.eye_mm[0] -= 0.125 * pixel_mm;
         test.scene.camera.target_mm[0] -= 0.125 * pixel_mm;
         test.scene.camera.eye_mm[1] -= 0.375 * pixel_mm;
