@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { LIGHT_LIMIT = 64, OBJECT_LIMIT = 1024, DEFAULT_DETAIL = 128 };
 
@@ -200,14 +201,53 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
 
 /* ---- scenes -------------------------------------------------------------------------------------- */
 
+/* at: the path of a picture; it is looked for, not read. */
+static bool find_picture(const struct io_json *at, const struct io_scene_options *options,
+                         struct io_environment *environment, dipole_status *status)
+{
+    const char *const text = json_string_value(at->value);
+    const char *const dot = text ? strrchr(text, '.') : NULL;
+    struct stat found;
+    if (!text)
+        return io_json_fail(at, DIPOLE_BAD_VALUE, status,
+                            "is not a string, expected the path of a picture");
+    if (!dot || (strcmp(dot, ".exr") != 0 && strcmp(dot, ".hdr") != 0))
+        return io_json_fail(at, DIPOLE_BAD_VALUE, status,
+                            "is \"%.100s\", expected a path that ends in .exr or .hdr", text);
+    if (!resolve(at, options, environment->path, status))
+        return false;
+    return (stat(environment->path, &found) == 0 && S_ISREG(found.st_mode)) ||
+           io_json_fail(at, DIPOLE_BAD_VALUE, status, "is \"%.100s\", which is no file", text);
+}
+
+static bool read_environment(const struct io_json *at, const struct io_scene_options *options,
+                             struct io_scene *scene, dipole_status *status)
+{
+    static const char *const known[] = { "image", "scale", "rotate_deg", NULL };
+    const struct io_json image = io_json_member(at, "image");
+    double rotate_deg = 0;
+    if (!at->value)
+        return true;
+    scene->environment = (struct io_environment){ .rgb = { 1, 1, 1 } };
+    if (!io_json_check_object(at, known, 1, status) ||
+        !io_scene_get_rgb(at, "scale", scene->environment.rgb, status) ||
+        !io_json_get_number(at, "rotate_deg", -IO_SCENE_LENGTH_MAX, IO_SCENE_LENGTH_MAX, &rotate_deg,
+                            status) ||
+        !find_picture(&image, options, &scene->environment, status))
+        return false;
+    scene->environment.rotate_rad = rotate_deg * IO_SCENE_RAD_PER_DEG;
+    scene->has_environment = true;
+    return true;
+}
+
 static bool read_lights(const struct io_json *at, double unit_mm, struct io_scene *scene,
                         dipole_status *status)
 {
     size_t count;
-    if (!io_json_check_array(at, 1, LIGHT_LIMIT, &count, status))
+    if (!io_json_check_array(at, scene->has_environment ? 0 : 1, LIGHT_LIMIT, &count, status))
         return false;
-    scene->lights = calloc(count, sizeof *scene->lights);
-    if (!scene->lights)
+    scene->lights = count > 0 ? calloc(count, sizeof *scene->lights) : NULL;
+    if (count > 0 && !scene->lights)
         return io_json_fail(at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
     for (; scene->light_count < count; scene->light_count++) {
         const struct io_json light = io_json_element(at, scene->light_count);
@@ -257,18 +297,24 @@ static bool read_objects(const struct io_json *at, const struct io_scene_options
 static bool fill_scene(const struct io_json *root, const struct io_scene_options *options,
                        struct io_scene *scene, dipole_status *status)
 {
-    static const char *const known[] = { "camera",     "lights",      "objects", "unit_mm",
-                                         "background", "exposure_ev", NULL };
-    const struct io_json camera = io_json_member(root, "camera"), lights = io_json_member(root, "lights"),
+    static const char *const known[] = { "lights",     "objects",     "camera",      "cameras", "unit_mm",
+                                         "background", "exposure_ev", "environment", "frames",  NULL };
+    const struct io_json environment = io_json_member(root, "environment"),
+                         lights = io_json_member(root, "lights"), frames = io_json_member(root, "frames"),
                          objects = io_json_member(root, "objects");
     double unit_mm = 1;
-    return io_json_check_object(root, known, 3, status) &&
-           io_json_get_number(root, "unit_mm", IO_SCENE_LENGTH_MIN, IO_SCENE_LENGTH_MAX, &unit_mm,
-                              status) &&
-           io_scene_get_rgb(root, "background", scene->background, status) &&
-           io_json_get_number(root, "exposure_ev", -100, 100, &scene->exposure_ev, status) &&
-           io_scene_read_camera(&camera, unit_mm, &scene->camera, status) &&
-           read_lights(&lights, unit_mm, scene, status) &&
+    if (!io_json_check_object(root, known, 2, status) ||
+        !io_json_get_number(root, "unit_mm", IO_SCENE_LENGTH_MIN, IO_SCENE_LENGTH_MAX, &unit_mm, status) ||
+        !io_scene_get_rgb(root, "background", scene->background, status) ||
+        !io_json_get_number(root, "exposure_ev", -100, 100, &scene->exposure_ev, status) ||
+        !io_scene_read_cameras(root, options->camera_name, unit_mm, &scene->camera, status))
+        return false;
+    if (options->width_px > 0)
+        scene->camera.width_px = options->width_px;
+    if (options->height_px > 0)
+        scene->camera.height_px = options->height_px;
+    return read_environment(&environment, options, scene, status) &&
+           read_lights(&lights, unit_mm, scene, status) && io_scene_read_frames(&frames, scene, status) &&
            read_objects(&objects, options, unit_mm, scene, status);
 }
 
@@ -294,10 +340,6 @@ bool io_scene_read(const char *path, const struct io_scene_options *options, str
         io_scene_destroy(scene);
         return false;
     }
-    if (options->width_px > 0)
-        scene->camera.width_px = options->width_px;
-    if (options->height_px > 0)
-        scene->camera.height_px = options->height_px;
     *scene_out = scene;
     return true;
 }
@@ -310,5 +352,6 @@ void io_scene_destroy(struct io_scene *scene)
         io_mesh_destroy(scene->objects[i].mesh);
     free(scene->objects);
     free(scene->lights);
+    free(scene->frames.lights);
     free(scene);
 }

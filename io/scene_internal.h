@@ -23,7 +23,12 @@ DIPOLE_CHECKED bool io_scene_get_coordinates(const struct io_json *object, const
 DIPOLE_CHECKED bool io_scene_get_rgb(const struct io_json *object, const char *key, double out[3],
                                      dipole_status *status);
 
-DIPOLE_CHECKED bool io_scene_read_camera(const struct io_json *at, double unit_mm, struct io_camera *camera,
+/* Read camera or cameras of the root, all of them, and keep the one of that name; NULL: the first. */
+DIPOLE_CHECKED bool io_scene_read_cameras(const struct io_json *root, const char *name, double unit_mm,
+                                          struct io_camera *camera, dipole_status *status);
+
+/* Read frames once camera and lights are there. An absent at is one frame. */
+DIPOLE_CHECKED bool io_scene_read_frames(const struct io_json *at, struct io_scene *scene,
                                          dipole_status *status);
 
 struct io_scene_transform {
