@@ -5,6 +5,7 @@
 #include "renderer/plan.h"
 
 extern const struct render_effect render_effect_surface;
+extern const struct render_effect render_effect_object_ids;
 extern const struct render_effect render_effect_light_view;
 extern const struct render_effect render_effect_light_samples;
 extern const struct render_effect render_effect_specular;

@@ -72,9 +72,10 @@ static void print_plan(const struct render_report *report)
 {
     printf("technique %s, epsilon %g\n", render_technique_names[report->technique], report->epsilon);
     if (report->r_max_mm > 0) {
-        printf("error predicted %.3g = truncation %.3g + aliasing %.3g + banding %.3g + table %.3g\n",
+        printf("error predicted %.3g = truncation %.3g + aliasing %.3g + blur %.3g + banding %.3g + table "
+               "%.3g\n",
                report->error_predicted, report->truncation_error, report->aliasing_error,
-               report->banding_error, report->table_error);
+               report->blur_error, report->banding_error, report->table_error);
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);
     }
@@ -205,19 +206,28 @@ static bool draw(struct job *job, dipole_status *status)
            cli_stdout_finish(status);
 }
 
+/* Of the folder that was named, if one was. */
+static bool find_tables(const struct job *job, struct render_tables **tables_out, dipole_status *status)
+{
+    struct render_media *media = NULL;
+    const bool is_done = !job->options->table_folder ||
+                         (render_media_create(job->scene, &media, status) &&
+                          render_tables_find(job->options->table_folder, media, tables_out, status));
+    render_media_destroy(media);
+    return is_done;
+}
+
 static bool draw_by_opengl(struct job *job, dipole_status *status)
 {
     const struct options *const options = job->options;
     const enum render_context_kind kind =
         options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
-    struct lut_splat *table = NULL;
-    bool is_done =
-        !options->table_folder ||
-        render_table_find(options->table_folder, &job->scene->objects[0].material, &table, status);
-    job->drawing.table = table;
+    struct render_tables *tables = NULL;
+    bool is_done = find_tables(job, &tables, status);
+    job->drawing.tables = tables ? tables->of_medium : NULL;
     is_done = is_done && render_create(job->scene, kind, &job->renderer, status) && draw(job, status);
     render_destroy(job->renderer);
-    lut_splat_destroy(table);
+    render_tables_destroy(tables);
     return is_done;
 }
 
@@ -245,8 +255,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                        .frame_count = options->frames[1] - options->frames[0] + 1 };
     bool is_png = false, done = false;
     if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
-        io_scene_read(scene_path, &reading, &job.scene, status) &&
-        check_frames(options, job.scene, status) && render_plan_check_media(job.scene, status))
+        io_scene_read(scene_path, &reading, &job.scene, status) && check_frames(options, job.scene, status))
         done = options->technique == RENDER_TECHNIQUE_REFERENCE ? draw(&job, status)
                                                                 : draw_by_opengl(&job, status);
     io_scene_destroy(job.scene);

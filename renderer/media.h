@@ -24,6 +24,12 @@ struct render_media {
     bool has_scattering; /* some medium has */
 };
 
+/* A medium's profile on disk or in memory: a row of a splat table. */
+struct render_table {
+    const struct lut_splat *lut;
+    size_t row;
+};
+
 /* Fails with DIPOLE_OUT_OF_MEMORY or as dipole_stack_create does. */
 DIPOLE_CHECKED bool render_media_create(const struct io_scene *scene, struct render_media **media_out,
                                         dipole_status *status);

@@ -16,14 +16,14 @@ static struct render_decision decide(const struct render_request *request, const
 static void bind(const struct render_frame *frame)
 {
     render_set_camera(frame->program, frame->plan);
-    render_set_exit(frame->program, frame->plan);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
     { .name = "composite",
       .draw = RENDER_DRAW_FULLSCREEN,
       .reads = { "surface_position_mm", "surface_normal", "position_mm", "normal" },
-      .reads_if_written = { "radiosity", "specular" },
+      .reads_if_written = { "radiosity", "specular", "object_media" },
       .writes = { "radiance" },
       .bind = bind },
 };

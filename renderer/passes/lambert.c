@@ -24,8 +24,7 @@ static struct render_decision decide(const struct render_request *request, const
 static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
-    render_set_vec3(frame->program, "diffuse_reflectance", frame->plan->diffuse_reflectance);
-    render_set_float(frame->program, "eta", frame->plan->eta);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
@@ -34,6 +33,7 @@ static const struct render_pass passes[] = {
       .is_per_view = true,
       .is_added = true,
       .reads = { "position_mm", "normal", "light_view" },
+      .reads_if_written = { "object_media" },
       .writes = { "radiosity" },
       .bind = bind },
 };

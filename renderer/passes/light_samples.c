@@ -1,7 +1,7 @@
 /* The light's view, reduced to samples no farther apart than the profile's spectrum allows (theory.md T11,
  * T13). */
 #include "renderer/effects.h"
-#include "renderer/execute.h"
+#include "renderer/splat_draw.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -19,13 +19,20 @@ static struct render_decision decide(const struct render_request *request, const
                              plan->aliasing_epsilon);
 }
 
+static bool sample(const struct render_frame *frame, dipole_status *status)
+{
+    struct render_splatter *splatter;
+    return render_executor_need_splatter(frame, &splatter, status) &&
+           render_splatter_sample_view(splatter, frame, status);
+}
+
 static const struct render_pass passes[] = {
     { .name = "light_samples",
       .draw = RENDER_DRAW_NOTHING,
       .is_per_view = true,
       .reads = { "light_view" },
       .writes = { "light_samples" },
-      .run = render_executor_sample_light_view },
+      .run = sample },
 };
 
 const struct render_effect render_effect_light_samples = {

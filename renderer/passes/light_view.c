@@ -24,7 +24,6 @@ static void bind(const struct render_frame *frame)
     render_set_light(frame->program, light);
     render_set_vec3(frame->program, "forward_ws", view->projection.forward);
     render_set_float(frame->program, "texel_area", view->texel_area);
-    render_set_float(frame->program, "eta", frame->plan->eta);
 }
 
 static const struct render_pass passes[] = {
@@ -32,6 +31,7 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_SCENE,
       .is_per_view = true,
       .writes = { "light_view" },
+      .writes_with_ids = "light_object",
       .depth_written = "light_depth",
       .bind = bind },
 };

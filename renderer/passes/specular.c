@@ -18,7 +18,7 @@ static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
     render_set_camera(frame->program, frame->plan);
-    render_set_float(frame->program, "eta", frame->plan->eta);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
@@ -27,6 +27,7 @@ static const struct render_pass passes[] = {
       .is_per_view = true,
       .is_added = true,
       .reads = { "surface_position_mm", "surface_normal", "light_view" },
+      .reads_if_written = { "object_media" },
       .writes = { "specular" },
       .bind = bind },
 };

@@ -1,7 +1,7 @@
 /* Subsurface scattering: every light sample adds flux times R_d(distance) to the pixels within r_max of it
  * (theory.md T14). */
 #include "renderer/effects.h"
-#include "renderer/execute.h"
+#include "renderer/splat_draw.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -19,13 +19,22 @@ static struct render_decision decide(const struct render_request *request, const
                              plan->r_max_px);
 }
 
+static bool draw(const struct render_frame *frame, dipole_status *status)
+{
+    struct render_splatter *splatter;
+    return render_executor_need_splatter(frame, &splatter, status) &&
+           render_splatter_draw(splatter, frame, frame->tables, status);
+}
+
 static const struct render_pass passes[] = {
     { .name = "splat",
-      .draw = RENDER_DRAW_SPLATS,
+      .draw = RENDER_DRAW_BY_RUN,
       .is_added = true,
       .reads = { "position_mm", "light_samples" },
+      .reads_if_written = { "object_media" },
       .writes = { "radiosity" },
-      .depth_tested = "position_depth" },
+      .depth_tested = "position_depth",
+      .run = draw },
 };
 
 const struct render_effect render_effect_splat = {

@@ -23,6 +23,7 @@ static void bind_resolve(const struct render_frame *frame)
     render_set_vec3(frame->program, "forward_ws", camera->forward);
     render_set_float(frame->program, "near_mm", camera->near_mm);
     render_set_float(frame->program, "far_mm", camera->far_mm);
+    render_set_camera(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
