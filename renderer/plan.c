@@ -147,15 +147,18 @@ static bool take_media(const struct render_request *request, struct render_plan 
                        scene->object_count);
 }
 
-static void look_at_objects(const struct io_scene *scene, struct render_plan *plan)
+/* A capture keeps the light of objects out of sight, too. */
+static void look_at_objects(const struct render_request *request, struct render_plan *plan)
 {
+    const struct io_scene *const scene = request->scene;
     for (size_t i = 0; i < scene->object_count; i++) {
         struct render_plan_object *const object = &plan->objects[i];
         double rectangle[4];
         object->medium = plan->media->of_object[i];
         object->ball = scene->object_count == 1 ? plan->ball : render_ball_of_mesh(scene->objects[i].mesh);
-        object->is_visible = render_projection_bound_sphere(&plan->camera, object->ball.centre_mm,
-                                                            object->ball.radius_mm, rectangle);
+        object->is_visible =
+            request->is_captured || render_projection_bound_sphere(&plan->camera, object->ball.centre_mm,
+                                                                   object->ball.radius_mm, rectangle);
         if (!object->is_visible)
             continue;
         struct render_plan_medium *const medium = &plan->of_medium[object->medium];
@@ -180,7 +183,7 @@ static bool read_scene(const struct render_request *request, struct render_plan 
     plan->pixel_mm = 2 * plan->camera.half_height / plan->height_px;
     for (size_t i = 0; i < scene->light_count; i++)
         plan->lit_count += render_light_shines(&scene->lights[i]);
-    look_at_objects(scene, plan);
+    look_at_objects(request, plan);
     return true;
 }
 

@@ -113,10 +113,10 @@ struct render_plan_object {
 /* What becomes of the visible objects of one medium. All 0 where there are none. */
 struct render_plan_medium {
     bool is_visible;
-    double diameter_mm; /* of the largest object                            */
-    double r_max_mm;    /* splats reach as far                              */
-    double spacing_mm;  /* asked of the finest light samples                */
-    double blur_mm;     /* of the profile, so that they do not show; 0: none is needed (footprint.h) */
+    double diameter_mm;               /* of the largest object                            */
+    double r_max_mm;                  /* splats reach as far                              */
+    double spacing_mm;                /* asked of the finest light samples                */
+    double blur_mm[IO_CHANNEL_COUNT]; /* of the profile, so that they do not show; 0: none is needed */
     struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
     int band_count;
     double truncation_error, aliasing_error, blur_error, table_error;

@@ -17,7 +17,7 @@ struct medium_samples {
 struct table_key {
     const struct lut_splat *table;
     size_t row;
-    double blur_mm;
+    double blur_mm[IO_CHANNEL_COUNT];
     int band_count;
     struct render_band bands[RENDER_BAND_LIMIT];
 };
@@ -155,8 +155,8 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
 static bool is_table_of(const struct table_key *key, const struct render_table *table,
                         const struct render_plan_medium *planned)
 {
-    return key->table == table->lut && key->row == table->row && key->blur_mm == planned->blur_mm &&
-           key->band_count == planned->band_count &&
+    return key->table == table->lut && key->row == table->row && key->band_count == planned->band_count &&
+           memcmp(key->blur_mm, planned->blur_mm, sizeof key->blur_mm) == 0 &&
            memcmp(key->bands, planned->bands, sizeof key->bands) == 0;
 }
 
@@ -183,10 +183,10 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     bool done = true;
     for (size_t m = 0; done && m < splatter->medium_count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
-        const struct render_band_source source = { .table = tables[m].lut,
-                                                   .row = tables[m].row,
-                                                   .medium = &plan->media->media[m],
-                                                   .blur_mm = planned->blur_mm };
+        struct render_band_source source = { .table = tables[m].lut,
+                                             .row = tables[m].row,
+                                             .medium = &plan->media->media[m] };
+        memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
         if (planned->band_count == 0)
             continue;
         done = render_bands_bake(&source, planned->bands, planned->band_count, next, status);
@@ -200,8 +200,8 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
         struct table_key *const key = &splatter->keys[m];
         *key = (struct table_key){ .table = tables[m].lut,
                                    .row = tables[m].row,
-                                   .blur_mm = planned->blur_mm,
                                    .band_count = planned->band_count };
+        memcpy(key->blur_mm, planned->blur_mm, sizeof key->blur_mm);
         memcpy(key->bands, planned->bands, sizeof key->bands);
     }
     free(nodes);

@@ -9,7 +9,7 @@ static struct render_decision decide(const struct render_request *request, const
 {
     if (plan->lit_count == 0)
         return render_not_called_for("no light shines");
-    if (!plan->has_scattering && !plan->has_specular)
+    if (!plan->has_scattering && !plan->has_specular && !request->is_captured)
         return render_not_called_for("no channel scatters and no surface is glossy");
     return render_called_for("%zu of %zu lights shine, seen in %zu view%s of up to %d texels a side",
                              plan->lit_count, request->scene->light_count, plan->view_count,
