@@ -14,7 +14,7 @@
 enum {
     VIEW_SIDE_WANTED = 768, /* shadows are drawn from the same view, so it never is coarser if it can */
     LEVELS_WANTED = 2,
-    LEVELS_LIMIT = 12,
+    LEVELS_LIMIT = 12, /* a block is then the whole view */
 };
 
 /* A point light this wide or less, seen from it, gets one view; a wider scene six. */
@@ -43,6 +43,7 @@ static void choose_view_size(const struct render_plan *plan, double width_mm, st
         view->levels--;
     view->size_px = cell_count << view->levels;
     view->levels += levels_of_coarsest(plan);
+    view->levels = view->levels < LEVELS_LIMIT ? view->levels : LEVELS_LIMIT;
     const double texel = 2 * view->projection.half_width / view->size_px;
     view->texel_area = texel * texel;
 }
