@@ -148,7 +148,8 @@ static bool take_media(const struct render_request *request, struct render_plan 
 }
 
 /* Normal of a triangle, as long as its area; its first corner. */
-static void area_vector(const struct io_mesh *mesh, size_t triangle, double corner_mm[3], double area_mm2[3])
+static void area_vector(const struct io_mesh *mesh, size_t triangle, double corner_mm[3],
+                        double area_mm2[3])
 {
     double sides[2][3];
     const float *const first = &mesh->positions[3 * (size_t)mesh->indices[3 * triangle]];
@@ -172,8 +173,8 @@ static double facing_area_mm2(const struct io_mesh *mesh, const struct io_light 
         double corner_mm[3], area_mm2[3], to_light[3];
         area_vector(mesh, t, corner_mm, area_mm2);
         for (int k = 0; k < 3; k++)
-            to_light[k] = light->kind == IO_LIGHT_POINT ? light->position_mm[k] - corner_mm[k]
-                                                        : -light->direction[k];
+            to_light[k] =
+                light->kind == IO_LIGHT_POINT ? light->position_mm[k] - corner_mm[k] : -light->direction[k];
         if (render_dot(area_mm2, to_light) > 0)
             sum_mm2 += sqrt(render_dot(area_mm2, area_mm2));
     }

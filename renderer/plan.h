@@ -106,7 +106,7 @@ struct render_plan_pass {
 struct render_plan_object {
     size_t medium;
     struct render_ball ball;
-    bool is_visible;   /* some of it may be in the picture; what is not is no more than a blocker */
+    bool is_visible;     /* some of it may be in the picture; what is not is no more than a blocker */
     double lit_area_mm2; /* of its surface that faces a light, light by light, whatever is in the way */
     double spacing_mm;   /* of its finest light samples                                          */
 };

@@ -176,7 +176,8 @@ static inline void random_place(struct rng *rng, struct io_mesh *mesh, double si
 static inline void random_damage(struct rng *rng, struct io_mesh *mesh)
 {
     for (int i = 0; i < 8; i++) {
-        const size_t a = random_bits(rng) % mesh->triangle_count, b = random_bits(rng) % mesh->triangle_count;
+        const size_t a = random_bits(rng) % mesh->triangle_count,
+                     b = random_bits(rng) % mesh->triangle_count;
         uint32_t *const at = mesh->indices + 3 * a;
         switch (random_index(rng, 4)) {
         case 0:
@@ -276,15 +277,15 @@ static inline void random_place_mm(struct rng *rng, const struct random_scene *r
     if (kind < 0.1)
         return;
     random_direction(rng, direction);
-    const double distance_mm = kind < 0.12   ? log_uniform(rng, 1, RANDOM_COORDINATE_MM)
+    const double distance_mm = kind < 0.12  ? log_uniform(rng, 1, RANDOM_COORDINATE_MM)
                                : kind < 0.2 ? 0
                                : kind < 0.3 ? size_mm * log_uniform(rng, 1e-6, 1)
                                : kind < 0.9 ? size_mm * uniform(rng, 1.5, 8)
                                             : size_mm * log_uniform(rng, 10, 1e6);
     for (int k = 0; k < 3; k++) {
         const double from_mm = chance(rng, 0.9) ? 0.5 * (scene->min_mm[k] + scene->max_mm[k]) : out_mm[k];
-        out_mm[k] = fmax(fmin(from_mm + distance_mm * direction[k], RANDOM_COORDINATE_MM),
-                         -RANDOM_COORDINATE_MM);
+        out_mm[k] =
+            fmax(fmin(from_mm + distance_mm * direction[k], RANDOM_COORDINATE_MM), -RANDOM_COORDINATE_MM);
     }
 }
 

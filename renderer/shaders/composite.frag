@@ -45,7 +45,9 @@ void main()
         sum.a += 1.0;
 #ifdef HAS_RADIOSITY
         vec3 normal_ws = texelFetch(surface_normal, pixel, i).xyz;
-        sum.rgb += radiosity_at(point_mm, normal_ws, pixel) * exit_per_sr(point_mm, normal_ws);
+        // profiles averaged over the samples' footprints overshoot a little (theory.md T34)
+        vec3 leaving = max(radiosity_at(point_mm, normal_ws, pixel), vec3(0.0));
+        sum.rgb += leaving * exit_per_sr(point_mm, normal_ws);
 #endif
     }
     radiance = sum / 4.0;
