@@ -24,8 +24,8 @@ vec3 radiosity_at(vec4 position_ws_mm, vec3 normal_ws, ivec2 pixel)
             ivec2 at = clamp(pixel + ivec2(i, j), ivec2(0), ivec2(width_px - 1, height_px - 1));
             vec4 there_mm = texelFetch(position_mm, at, 0);
             vec3 step_mm = there_mm.xyz - position_ws_mm.xyz;
-            float spread = dot(step_mm, step_mm) + blur_mm * blur_mm;
-            float weight = there_mm.w == position_ws_mm.w ? blur_mm * blur_mm * blur_mm * blur_mm / (spread * spread) : 0.0;
+            float part = blur_mm * blur_mm / max(dot(step_mm, step_mm) + blur_mm * blur_mm, 1e-37);
+            float weight = there_mm.w == position_ws_mm.w ? part * part : 0.0;
             sum += weight * texelFetch(radiosity, at, 0).rgb;
             weight_sum += weight;
         }

@@ -18,7 +18,7 @@ layout(location = 1) out float light_object;
 void main()
 {
     vec3 to_light = toward(light, position_ws_mm);
-    float cosine = clamp(dot(normalize(normal_ws), to_light), 0.0, 1.0);
+    float cosine = clamp(dot(unit_or(normal_ws, to_light), to_light), 0.0, 1.0);
     float axis_cosine = light.w > 0.0 ? -dot(to_light, forward_ws) : 1.0;
     float size = texel_area * axis_cosine * axis_cosine * axis_cosine;
     float share = gl_FrontFacing ? size * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;

@@ -1,4 +1,6 @@
-// Pass surface: position (w: number of the object, from 1) and normal (w = roughness, 0 without gloss).
+// Pass surface: position (w: number of the object, from 1) and normal (w = roughness, 0 without gloss): the
+// triangle's own where those of its corners cancel.
+#include "common/direction.glsl"
 centroid in vec3 position_ws_mm;
 centroid in vec3 normal_ws;
 uniform float roughness;
@@ -9,5 +11,6 @@ layout(location = 1) out vec4 normal_out;
 void main()
 {
     position_out_mm = vec4(position_ws_mm, object);
-    normal_out = vec4(normalize(normal_ws), roughness);
+    vec3 face = unit_or(cross(dFdx(position_ws_mm), dFdy(position_ws_mm)), vec3(0.0, 0.0, 1.0));
+    normal_out = vec4(unit_or(normal_ws, gl_FrontFacing ? face : -face), roughness);
 }
