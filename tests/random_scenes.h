@@ -14,6 +14,12 @@ enum { RANDOM_LIGHTS = 4, RANDOM_OBJECTS = 6 };
 /* What io/scene_file.c lets through: coordinates of meshes, those of eyes and lights, powers. */
 static const double RANDOM_REACH_MM = 1e9, RANDOM_COORDINATE_MM = 1e12, RANDOM_POWER = 1e12;
 
+/* Shares of materials that take long to plan for or to draw. */
+struct random_shares {
+    double slow; /* other models than the dipole, and layers                                          */
+    double wild; /* mean free paths from 1e-6 to 1e6 mm, whatever the object's size; else near to it  */
+};
+
 /* A scene and what is asked of it. Begin with random_scene_init, end with random_scene_end. */
 struct random_scene {
     uint64_t seed;
@@ -49,8 +55,8 @@ static inline void random_direction(struct rng *rng, double out[3])
 
 /* ---- materials ---------------------------------------------------------------------------------- */
 
-/* A half-space: mean free paths from 1e-6 to 1e6 mm, or near the size given; channels alike or not. */
-static inline void random_half_space(struct rng *rng, double size_mm, bool is_slow,
+/* A half-space; channels alike or not. */
+static inline void random_half_space(struct rng *rng, double size_mm, bool is_slow, bool is_wild,
                                      struct io_material *material)
 {
     static const dipole_model models[] = { DIPOLE_MODEL_DIPOLE, DIPOLE_MODEL_MULTIPOLE,
@@ -58,8 +64,7 @@ static inline void random_half_space(struct rng *rng, double size_mm, bool is_sl
                                            DIPOLE_MODEL_MODES };
     const int model_count = is_slow ? 5 : 1;
     const double eta = chance(rng, 0.2) ? 1 : log_uniform(rng, 0.7, 3);
-    const double common_mm =
-        chance(rng, 0.5) ? size_mm * log_uniform(rng, 1e-3, 10) : log_uniform(rng, 1e-6, 1e6);
+    const double common_mm = is_wild ? log_uniform(rng, 1e-6, 1e6) : size_mm * log_uniform(rng, 2e-2, 10);
     dipole_medium media[3];
     for (int c = 0; c < 3; c++) {
         const double free_path_mm = common_mm * (chance(rng, 0.2) ? log_uniform(rng, 1e-3, 1e3) : 1);
@@ -109,17 +114,16 @@ static inline bool random_material_is_legal(const struct io_material *material)
     return is_legal;
 }
 
-/* slow: the share of other models than the dipole and of layers, which take a hundred times longer. */
-static inline void random_material(struct rng *rng, double size_mm, double slow,
+static inline void random_material(struct rng *rng, double size_mm, const struct random_shares *shares,
                                    struct io_material *material)
 {
     do {
-        const bool is_slow = chance(rng, slow);
+        const bool is_slow = chance(rng, shares->slow), is_wild = chance(rng, shares->wild);
         *material = (struct io_material){ .name = "random" };
         if (is_slow && chance(rng, 0.5))
             random_stack(rng, size_mm, material);
         else
-            random_half_space(rng, size_mm, is_slow, material);
+            random_half_space(rng, size_mm, is_slow, is_wild, material);
     } while (!random_material_is_legal(material));
 }
 
@@ -220,7 +224,7 @@ static inline void random_bounds(struct io_mesh *mesh)
 }
 
 static inline void random_object(struct rng *rng, struct random_scene *random, double size_mm,
-                                 const double middle_mm[3], double slow)
+                                 const double middle_mm[3], const struct random_shares *shares)
 {
     struct io_scene *const scene = &random->scene;
     struct io_object *const object = &random->objects[scene->object_count];
@@ -245,7 +249,7 @@ static inline void random_object(struct rng *rng, struct random_scene *random, d
     if (number > 0 && chance(rng, 0.4))
         object->material = random->objects[0].material;
     else
-        random_material(rng, size_mm, slow, &object->material);
+        random_material(rng, size_mm, shares, &object->material);
     for (int k = 0; k < 3; k++) {
         scene->min_mm[k] = number == 0 ? (double)object->mesh->min[k]
                                        : fmin(scene->min_mm[k], (double)object->mesh->min[k]);
@@ -348,8 +352,8 @@ static inline void random_light(struct rng *rng, struct random_scene *random, do
 
 /* ---- the scene ---------------------------------------------------------------------------------- */
 
-/* slow: of random_material. */
-static inline void random_scene_init(struct random_scene *random, uint64_t seed, double slow)
+static inline void random_scene_init(struct random_scene *random, uint64_t seed,
+                                     const struct random_shares *shares)
 {
     static const enum render_technique techniques[] = { RENDER_TECHNIQUE_AUTO, RENDER_TECHNIQUE_SPLAT,
                                                         RENDER_TECHNIQUE_LAMBERT };
@@ -365,7 +369,7 @@ static inline void random_scene_init(struct random_scene *random, uint64_t seed,
         middle_mm[k] = chance(&rng, 0.9) ? 0 : size_mm * log_uniform(&rng, 1, 1e8);
     const int object_count = chance(&rng, 0.4) ? 1 : 1 + random_index(&rng, RANDOM_OBJECTS);
     for (int i = 0; i < object_count; i++)
-        random_object(&rng, random, size_mm, middle_mm, slow);
+        random_object(&rng, random, size_mm, middle_mm, shares);
     random_camera(&rng, random, size_mm);
     const int light_count = random_index(&rng, RANDOM_LIGHTS + 1);
     for (int i = 0; i < light_count; i++)

@@ -12,8 +12,7 @@ enum { SCENE_COUNT = 300 };
 enum { SCENE_COUNT = 10000 };
 #endif
 
-/* Of slow materials, for the time it takes. */
-#define SLOW 0.05
+static const struct random_shares shares = { .slow = 0.05, .wild = 0.5 };
 
 static uint64_t only_seed;
 
@@ -109,7 +108,7 @@ static void a_random_scene_is_planned_or_refused(void **state)
     const uint64_t first = only_seed ? only_seed : 1, count = only_seed ? 1 : SCENE_COUNT;
     for (uint64_t seed = first; seed < first + count; seed++) {
         struct random_scene random;
-        random_scene_init(&random, seed, SLOW);
+        random_scene_init(&random, seed, &shares);
         const struct render_request request = random_scene_request(&random);
         struct render_plan *plan = NULL;
         dipole_status status = { .code = DIPOLE_OK };
