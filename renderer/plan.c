@@ -197,15 +197,13 @@ bool render_light_shines(const struct io_light *light)
     return light->rgb[0] > 0 || light->rgb[1] > 0 || light->rgb[2] > 0;
 }
 
-bool render_plan_read_scene(const struct render_request *request, struct render_plan *plan,
-                            dipole_status *status)
+bool render_scene_check(const struct io_scene *scene, double epsilon, dipole_status *status)
 {
-    const struct io_scene *const scene = request->scene;
     const struct io_camera *const camera = &scene->camera;
     const dipole_place place = { .source = scene->path };
-    if (!(request->epsilon >= RENDER_EPSILON_MIN && request->epsilon <= RENDER_EPSILON_MAX))
-        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "epsilon is %g, expected %g to %g",
-                           request->epsilon, RENDER_EPSILON_MIN, RENDER_EPSILON_MAX);
+    if (!(epsilon >= RENDER_EPSILON_MIN && epsilon <= RENDER_EPSILON_MAX))
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "epsilon is %g, expected %g to %g", epsilon,
+                           RENDER_EPSILON_MIN, RENDER_EPSILON_MAX);
     if (camera->width_px < 1 || camera->height_px < 1 || camera->width_px > RENDER_SIDE_LIMIT ||
         camera->height_px > RENDER_SIDE_LIMIT ||
         (size_t)camera->width_px * (size_t)camera->height_px > RENDER_PIXEL_LIMIT)
@@ -215,8 +213,16 @@ bool render_plan_read_scene(const struct render_request *request, struct render_
     if (scene->light_count > LIGHT_LIMIT)
         return dipole_fail(status, DIPOLE_BAD_VALUE, &place, "%zu lights, expected at most %d",
                            scene->light_count, LIGHT_LIMIT);
+    return true;
+}
+
+bool render_plan_read_scene(const struct render_request *request, struct render_plan *plan,
+                            dipole_status *status)
+{
+    const struct io_scene *const scene = request->scene;
+    const struct io_camera *const camera = &scene->camera;
     const struct io_material *const material = &scene->objects[0].material;
-    if (!render_plan_check_media(scene, status) ||
+    if (!render_scene_check(scene, request->epsilon, status) || !render_plan_check_media(scene, status) ||
         (request->table && !render_plan_check_table(request->table, material, NULL, status)))
         return false;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {

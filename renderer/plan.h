@@ -144,6 +144,10 @@ void render_plan_destroy(struct render_plan *plan);
 DIPOLE_CHECKED bool render_plan_read_scene(const struct render_request *request, struct render_plan *plan,
                                            dipole_status *status);
 
+/* What every technique asks of a scene: size of the picture, number of lights; and of epsilon. Fails with
+ * DIPOLE_BAD_VALUE. */
+DIPOLE_CHECKED bool render_scene_check(const struct io_scene *scene, double epsilon, dipole_status *status);
+
 /* Whether a light is not black. */
 bool render_light_shines(const struct io_light *light);
 
