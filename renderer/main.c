@@ -16,7 +16,7 @@ struct options {
     struct cli_texts allowed_paths;
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
-    int technique, context;
+    int technique, context, area;
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
@@ -251,6 +251,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     struct job job = { .tool = tool,
                        .options = options,
                        .drawing = { .technique = (enum render_technique)options->technique,
+                                    .area = (enum render_area)options->area,
                                     .epsilon = options->epsilon },
                        .frame_count = options->frames[1] - options->frames[0] + 1 };
     bool is_png = false, done = false;
@@ -289,6 +290,14 @@ int main(int argc, char **argv)
                   "on the "
                   "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
+        { .name = "splat-area",
+          .kind = CLI_CHOICE,
+          .target = &options.area,
+          .argument = "NAME",
+          .help =
+              "Area that a light sample stands for: flux, which needs none, or overlap, counted as in the "
+              "paper, for comparison. Default flux.",
+          .choices = render_area_names },
         { .name = "epsilon",
           .letter = 'e',
           .kind = CLI_NUMBER,

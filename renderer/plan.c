@@ -12,6 +12,7 @@
 enum { LIGHT_LIMIT = 1024 };
 
 const char *const render_technique_names[] = { "auto", "splat", "lambert", "reference", NULL };
+const char *const render_area_names[] = { "flux", "overlap", NULL };
 
 static struct render_decision decision(bool is_active, const char *format, va_list arguments)
     __attribute__((format(printf, 2, 0)));
@@ -220,11 +221,17 @@ static void tell_objects_apart(const struct io_scene *scene, struct render_plan 
 static void choose_technique(const struct render_request *request, struct render_plan *plan)
 {
     plan->technique = request->technique;
+    plan->area = request->is_captured ? RENDER_AREA_FLUX : request->area;
     if (request->is_captured)
         plan->technique = RENDER_TECHNIQUE_SPLAT;
     else if (plan->technique == RENDER_TECHNIQUE_AUTO)
         plan->technique =
             plan->has_scattering && plan->r_max_px < 1 ? RENDER_TECHNIQUE_LAMBERT : RENDER_TECHNIQUE_SPLAT;
+    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+        plan->area = RENDER_AREA_FLUX;
+    if (request->scene->has_environment)
+        render_plan_add_note(plan, "the environment \"%.120s\" is not drawn: no technique knows it yet",
+                             request->scene->environment.path);
 }
 
 /* ---- the plan ----------------------------------------------------------------------------------- */

@@ -19,6 +19,7 @@ struct render_request {
     double epsilon;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
+    enum render_area area;
     bool is_captured; /* no scattering; what it would need is kept instead */
     bool is_tone_mapped;
 };
@@ -30,7 +31,7 @@ enum render_draw_kind {
     RENDER_DRAW_NOTHING,    /* the pass's run function needs no targets        */
 };
 
-enum { RENDER_PASS_READS = 8, RENDER_PASS_WRITES = 4 };
+enum { RENDER_PASS_READS = 8, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 2, RENDER_PASS_TARGETS = 6 };
 
 /* One row of an effect. Names of textures are those of the table in plan.c. */
 struct render_pass {
@@ -38,13 +39,14 @@ struct render_pass {
     enum render_draw_kind draw;
     bool is_per_view; /* once for each of the lights' views        */
     bool is_added;    /* to what the target holds, else replaces it */
+    bool is_blended;  /* draws add up, on a target that was cleared         */
     const char *reads[RENDER_PASS_READS];
     const char *reads_if_written[RENDER_PASS_READS]; /* shader sees HAS_<NAME>        */
     const char *writes[RENDER_PASS_WRITES];
-    const char *writes_with_ids; /* behind them, where the plan tells objects apart: HAS_<NAME> */
-    const char *depth_written;   /* depth texture, tested and written         */
-    const char *depth_tested;    /* depth texture, tested only                */
-    void (*bind)(const struct render_frame *frame);                       /* sets uniforms  */
+    const char *writes_if_wanted[RENDER_PASS_EXTRAS]; /* behind them, if render_plan_wants: HAS_<NAME> */
+    const char *depth_written;                        /* depth texture, tested and written         */
+    const char *depth_tested;                         /* depth texture, tested only                */
+    void (*bind)(const struct render_frame *frame);   /* sets uniforms  */
     bool (*run)(const struct render_frame *frame, dipole_status *status); /* BY_RUN and NOTHING */
 };
 
@@ -125,6 +127,7 @@ struct render_plan_medium {
 /* Owns its lists; end it with render_plan_destroy. */
 struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
+    enum render_area area;
     double epsilon;
     const struct render_media *media;
     struct render_media *own_media; /* when the request brought none                    */
@@ -191,7 +194,10 @@ DIPOLE_CHECKED bool render_plan_add_passes(struct render_plan *plan,
 
 /* The textures that a pass writes under this plan, ending with NULL; depth aside. */
 void render_plan_list_writes(const struct render_plan *plan, const struct render_pass *pass,
-                             const char *writes[RENDER_PASS_WRITES + 2]);
+                             const char *writes[RENDER_PASS_TARGETS + 1]);
+
+/* Whether the scene calls for a texture that a pass can write beside its others. */
+bool render_plan_wants(const struct render_plan *plan, const char *texture);
 
 /* Whether a pass of the plan writes, or needs, that texture. */
 bool render_plan_writes(const struct render_plan *plan, const char *texture);

@@ -162,6 +162,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
     const struct render_request request = {
         .scene = renderer->scene,
         .technique = options->technique,
+        .area = options->area,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
         .media = renderer->media,
         .tables = options->tables,

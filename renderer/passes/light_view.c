@@ -31,7 +31,7 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_SCENE,
       .is_per_view = true,
       .writes = { "light_view" },
-      .writes_with_ids = "light_object",
+      .writes_if_wanted = { "light_object", "light_irradiance" },
       .depth_written = "light_depth",
       .bind = bind },
 };

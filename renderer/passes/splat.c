@@ -11,6 +11,8 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("captured without scattering");
     if (plan->technique != RENDER_TECHNIQUE_SPLAT)
         return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
+    if (plan->area != RENDER_AREA_FLUX)
+        return render_not_called_for("areas are counted: overlap");
     if (!plan->has_scattering)
         return render_not_called_for("no channel scatters");
     if (plan->lit_count == 0)
@@ -23,7 +25,7 @@ static bool draw(const struct render_frame *frame, dipole_status *status)
 {
     struct render_splatter *splatter;
     return render_executor_need_splatter(frame, &splatter, status) &&
-           render_splatter_draw(splatter, frame, frame->tables, status);
+           render_splatter_draw(splatter, frame, status);
 }
 
 static const struct render_pass passes[] = {
