@@ -53,6 +53,8 @@ struct render_pass {
 struct render_decision {
     bool is_active;
     char reason[160];
+    double cost_ms; /* predicted, 0 unless active         */
+    double error;   /* that it leaves, relative radiosity */
 };
 
 struct render_plan;
@@ -60,6 +62,8 @@ struct render_plan;
 struct render_effect {
     const char *name, *source; /* source: publication, or what it is */
     struct render_decision (*decide)(const struct render_request *request, const struct render_plan *plan);
+    double (*cost_ms)(const struct render_plan *plan); /* when it is active (cost.h)  */
+    double (*error)(const struct render_plan *plan);   /* NULL: it leaves none        */
     const struct render_pass *passes;
     size_t pass_count;
 };
@@ -108,8 +112,9 @@ struct render_plan_pass {
 struct render_plan_object {
     size_t medium;
     struct render_ball ball;
-    bool is_visible;   /* some of it may be in the picture; what is not is no more than a blocker */
-    double spacing_mm; /* of its finest light samples                                            */
+    bool is_visible;    /* some of it may be in the picture; what is not is no more than a blocker */
+    double pixel_count; /* that it may cover, as a ball would                                     */
+    double spacing_mm;  /* of its finest light samples                                            */
 };
 
 /* What becomes of the visible objects of one medium. All 0 where there are none. */
@@ -138,6 +143,8 @@ struct render_plan {
     bool has_object_ids;    /* objects are told apart: they differ, or are near each other */
     const char *ids_reason; /* why, or why not                                             */
     size_t lit_count;       /* lights that are not black                        */
+    size_t triangle_count;
+    double covered_px; /* pixels that objects may cover, at most all       */
 
     /* The error budget: shares of epsilon, then what they lead to, of the worst medium. */
     double truncation_epsilon, aliasing_epsilon, banding_epsilon, table_epsilon;

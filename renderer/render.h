@@ -85,7 +85,8 @@ struct render_effect_report {
     const char *name;
     bool is_active;
     char reason[160];
-    double time_ms;
+    double predicted_ms, time_ms;
+    double error; /* predicted, that it leaves */
 };
 
 /* What was done, why, and how long it took. */

@@ -1,5 +1,6 @@
 /* Subsurface scattering with areas as the paper counts them: the disc that a splat covers, over the number
  * of samples whose discs overlap at a pixel. For comparison with the flux of passes/splat.c. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/splat_draw.h"
 
@@ -16,6 +17,12 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no light shines");
     return render_called_for("asked for; %zu view%s counted one by one", plan->view_count,
                              plan->view_count == 1 ? "" : "s");
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return 2 * RENDER_COST_PROGRAM_MS +
+           render_cost_ms(RENDER_COST_SPLAT_EVALUATION, render_cost_splat_evaluations(plan));
 }
 
 /* Samples of other views have counters of their own. */
@@ -58,6 +65,7 @@ const struct render_effect render_effect_overlap = {
     .name = "overlap",
     .source = "Shah, Konttinen and Pattanaik 2009, equation 4",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };
