@@ -224,7 +224,7 @@ static void results_are_told_as_promised(void **state)
     assert_int_equal(
         run(RENDER " sphere.json -o b.exr --explain --size 32x24 -t lambert", out, err, sizeof err), 0);
     assert_non_null(strstr(out, "technique lambert, epsilon 0.01\n"));
-    assert_non_null(strstr(out, "splat             no            0.0  technique is lambert\n"));
+    assert_non_null(strstr(out, "splat             no            0.0        0.0         0  technique is lambert\n"));
     assert_non_null(strstr(out, "b.exr: lambert, epsilon 0.01, "));
 }
 
