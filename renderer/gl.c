@@ -221,3 +221,24 @@ void render_set_matrix(GLuint program, const char *name, const struct render_pro
     render_projection_matrix(projection, matrix);
     glProgramUniformMatrix4fv(program, glGetUniformLocation(program, name), 1, GL_FALSE, matrix);
 }
+
+/* ---- buffers ------------------------------------------------------------------------------------ */
+
+void render_buffer_texture_destroy(struct render_buffer_texture *buffer)
+{
+    if (buffer->texture)
+        glDeleteTextures(1, &buffer->texture);
+    if (buffer->buffer)
+        glDeleteBuffers(1, &buffer->buffer);
+    *buffer = (struct render_buffer_texture){ 0 };
+}
+
+void render_buffer_texture_fill(struct render_buffer_texture *buffer, GLenum format, const void *data,
+                                size_t size)
+{
+    render_buffer_texture_destroy(buffer);
+    glCreateBuffers(1, &buffer->buffer);
+    glNamedBufferStorage(buffer->buffer, (GLsizeiptr)size, data, 0);
+    glCreateTextures(GL_TEXTURE_BUFFER, 1, &buffer->texture);
+    glTextureBuffer(buffer->texture, format, buffer->buffer);
+}

@@ -20,8 +20,16 @@ struct render_medium {
 struct render_media {
     struct render_medium *media;
     size_t count;
+    size_t object_count;
+    double *area_mm2;    /* of each object's surface                                      */
     size_t *of_object;   /* index into media, for each object of the scene */
     bool has_scattering; /* some medium has */
+};
+
+/* A medium's profile on disk or in memory: a row of a splat table. */
+struct render_table {
+    const struct lut_splat *lut;
+    size_t row;
 };
 
 /* Fails with DIPOLE_OUT_OF_MEMORY or as dipole_stack_create does. */

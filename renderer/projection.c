@@ -20,24 +20,38 @@ static void normalise(double v[3])
         v[k] /= length;
 }
 
+static double farthest2(const struct io_mesh *mesh, const double centre_mm[3])
+{
+    double radius2 = 0;
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+        double distance2 = 0;
+        for (int k = 0; k < 3; k++) {
+            const double d = (double)mesh->positions[3 * v + (size_t)k] - centre_mm[k];
+            distance2 += d * d;
+        }
+        radius2 = fmax(radius2, distance2);
+    }
+    return radius2;
+}
+
 struct render_ball render_ball_of_scene(const struct io_scene *scene)
 {
     struct render_ball ball = { .radius_mm = 0 };
     for (int k = 0; k < 3; k++)
         ball.centre_mm[k] = 0.5 * (scene->min_mm[k] + scene->max_mm[k]);
     double radius2 = 0;
-    for (size_t i = 0; i < scene->object_count; i++) {
-        const struct io_mesh *const mesh = scene->objects[i].mesh;
-        for (size_t v = 0; v < mesh->vertex_count; v++) {
-            double distance2 = 0;
-            for (int k = 0; k < 3; k++) {
-                const double d = (double)mesh->positions[3 * v + (size_t)k] - ball.centre_mm[k];
-                distance2 += d * d;
-            }
-            radius2 = fmax(radius2, distance2);
-        }
-    }
+    for (size_t i = 0; i < scene->object_count; i++)
+        radius2 = fmax(radius2, farthest2(scene->objects[i].mesh, ball.centre_mm));
     ball.radius_mm = sqrt(radius2);
+    return ball;
+}
+
+struct render_ball render_ball_of_mesh(const struct io_mesh *mesh)
+{
+    struct render_ball ball = { .radius_mm = 0 };
+    for (int k = 0; k < 3; k++)
+        ball.centre_mm[k] = 0.5 * ((double)mesh->min[k] + (double)mesh->max[k]);
+    ball.radius_mm = sqrt(farthest2(mesh, ball.centre_mm));
     return ball;
 }
 

@@ -459,8 +459,8 @@ static bool read_media(struct reference *reference, dipole_status *status)
 static bool begin(struct reference *reference, dipole_status *status)
 {
     const struct io_scene *const scene = reference->scene;
-    if (!render_scene_check(scene, reference->report.epsilon, status) || !read_media(reference, status) ||
-        !render_tracer_create(scene, &reference->tracer, status))
+    if (!render_plan_check_request(scene, reference->report.epsilon, status) ||
+        !read_media(reference, status) || !render_tracer_create(scene, &reference->tracer, status))
         return false;
     for (size_t i = 0; i < scene->light_count; i++)
         reference->lit_count += render_light_shines(&scene->lights[i]);

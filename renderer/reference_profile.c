@@ -9,8 +9,7 @@ enum {
     MANTISSA_BITS = 52,
     PARTS_BITS_MIN = 3, /* pieces to a power of two: 8 ... */
     PARTS_BITS_MAX = 9, /* ... to 512                      */
-    NARROWINGS = 4,
-    PROBES = 5, /* places in a piece at which its error is measured */
+    PROBES = 5,         /* places in a piece at which its error is measured */
 };
 
 /* Asked of the table where the profile is above its noise, relative. */
@@ -167,6 +166,22 @@ static void fill_bounds(struct render_profile *profile)
     }
 }
 
+/* Some profiles of the modes are not positive everywhere, so not all of them fall with distance (T29). */
+static void fill_least(struct render_profile *profile)
+{
+    render_lanes least = { INFINITY, INFINITY, INFINITY, 0 };
+    for (size_t i = 0; i < profile->count; i++) {
+        const double start = start_of(profile, i), width = start_of(profile, i + 1) - start;
+        for (int place = 0; place < 3; place++) {
+            render_lanes value;
+            render_profile_at(profile, start + 0.4999999 * place * width - profile->shift_mm2, &value);
+            for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+                least[c] = fmin(least[c], fmax(value[c], 0));
+        }
+        profile->pieces[i].least = (1 - 1e-6) * least;
+    }
+}
+
 /* Lay out so many parts to a power of two, and fill them. false: no memory. */
 static bool fill(struct render_profile *profile, const struct render_medium *medium, int parts_bits,
                  double least_core_mm)
@@ -238,20 +253,21 @@ bool render_profile_create(const struct render_medium *medium, double far_mm, do
     if (profile->is_singular)
         shift_mm = fmin(shift_mm, 0.03 * least_core_mm);
     profile->shift_mm2 = exp2(floor(log2(shift_mm * shift_mm))); /* where a piece begins */
-    profile->max_error = INFINITY;
-    bool done = true;
-    for (int narrowing = 0; done && narrowing < NARROWINGS && profile->max_error > table_error;
-         narrowing++) {
-        for (int bits = PARTS_BITS_MIN; done && bits <= PARTS_BITS_MAX && profile->max_error > table_error;
-             bits++)
-            done = fill(profile, medium, bits, profile->is_singular ? least_core_mm : 0);
-        profile->shift_mm2 /= profile->max_error > table_error && narrowing + 1 < NARROWINGS ? 64 : 1;
+    double last_error = INFINITY;
+    bool done = fill(profile, medium, PARTS_BITS_MIN, profile->is_singular ? least_core_mm : 0);
+    for (int bits = PARTS_BITS_MIN + 1; done && bits <= PARTS_BITS_MAX && profile->max_error > table_error;
+         bits++) {
+        if (bits > PARTS_BITS_MIN + 2 && profile->max_error > 0.5 * last_error)
+            break; /* a kink, where the library cuts off at 0 */
+        last_error = profile->max_error;
+        done = fill(profile, medium, bits, profile->is_singular ? least_core_mm : 0);
     }
     if (!done) {
         render_profile_destroy(profile);
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a profile");
     }
     fill_bounds(profile);
+    fill_least(profile);
     *profile_out = profile;
     return true;
 }

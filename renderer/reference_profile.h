@@ -20,6 +20,7 @@ enum { RENDER_PROFILE_TERMS = 6 };
 /* Between two nodes: a polynomial in the distance to the lower one, and the bound from there on. */
 struct render_profile_piece {
     render_lanes terms[RENDER_PROFILE_TERMS];
+    render_lanes least; /* no value at this distance or nearer is smaller, in 1/mm^2 */
     render_lanes
         bound; /* |d^4 R/dr^4| and its like in any direction, at this distance or farther, 1/mm^6 */
 };

@@ -349,15 +349,15 @@ WIDE static void add_points(const struct render_tree_point *points, uint32_t cou
     }
 }
 
-/* The profile at the farthest that a target can be from a point of the node: the least of all. */
+/* No less than this arrives at a target from a point of the node, for each unit of its flux: the least up
+ * to the farthest that they can be apart. */
 static inline void least_value(const struct visit *visit, const struct node *node, double away_mm,
                                render_lanes *value_out)
 {
     const double far_mm = smaller(larger(away_mm + node->radius_mm + visit->radius_mm, visit->core_mm),
                                   visit->profile->far_mm);
-    render_profile_at(visit->profile, far_mm * far_mm, value_out);
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        (*value_out)[c] = larger((*value_out)[c], 0);
+    double u;
+    *value_out = render_profile_find(visit->profile, far_mm * far_mm, &u)->least;
 }
 
 /* The share that an error takes of what a node may err by. */

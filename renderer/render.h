@@ -6,6 +6,7 @@
 #include "io/scene_file.h"
 #include "lutgen/lut.h"
 #include "renderer/light_samples.h"
+#include "renderer/media.h"
 
 /* Where OpenGL 4.5 comes from. The default tries OSMesa, then EGL. */
 enum render_context_kind {
@@ -25,6 +26,11 @@ enum render_technique {
 };
 extern const char *const render_technique_names[]; /* "auto", "splat", "lambert", "reference", NULL */
 
+/* How a splat knows the area that its sample stands for: by the flux of its texels, which needs no area; or
+ * as in the paper, its disc of r_max over the number of samples that overlap a pixel, for comparison. */
+enum render_area { RENDER_AREA_FLUX = 0, RENDER_AREA_OVERLAP };
+extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
+
 /* epsilon: asked relative error of the radiosity. */
 #define RENDER_EPSILON_DEFAULT 0.01
 #define RENDER_EPSILON_MIN 1e-5
@@ -40,8 +46,8 @@ struct renderer;
 /*
  * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
  * and lights may change between calls, its objects may not.
- * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed),
- * DIPOLE_BAD_VALUE (objects of different media) or DIPOLE_OUT_OF_MEMORY.
+ * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed) or
+ * DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                                   struct renderer **renderer_out, dipole_status *status);
@@ -55,10 +61,11 @@ struct render_progress {
 
 struct render_options {
     enum render_technique technique;
-    double epsilon;                /* 0: RENDER_EPSILON_DEFAULT                              */
-    const struct lut_splat *table; /* of the scene's medium; NULL: baked in memory           */
-    bool is_tone_mapped;           /* 0..1 over the scene's background, for a PNG; else
-                                      linear radiance, premultiplied by coverage (alpha)     */
+    double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
+    enum render_area area;
+    const struct render_table *tables; /* one for each of the scene's media; NULL: baked in memory */
+    bool is_tone_mapped;               /* 0..1 over the scene's background, for a PNG; else
+                                          linear radiance, premultiplied by coverage (alpha)  */
 
     /* Of the reference alone. */
     struct render_progress progress;
@@ -78,15 +85,16 @@ struct render_effect_report {
     const char *name;
     bool is_active;
     char reason[160];
-    double time_ms;
+    double predicted_ms, time_ms;
+    double error; /* predicted, that it leaves */
 };
 
 /* What was done, why, and how long it took. */
 struct render_report {
     enum render_technique technique; /* never AUTO */
     double epsilon;
-    double error_predicted; /* the sum of these four; of the reference estimated */
-    double truncation_error, aliasing_error, banding_error, table_error;
+    double error_predicted; /* the sum of these five; of the reference estimated */
+    double truncation_error, aliasing_error, blur_error, banding_error, table_error;
     double r_max_mm, spacing_mm; /* 0 when not splatted */
     size_t sample_count;         /* at the finest */
     size_t splat_count, view_count;
