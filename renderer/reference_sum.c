@@ -88,7 +88,7 @@ bool render_sum_create(const struct render_pixel_view *view, const struct render
     sum->media = media;
     sum->area_mm2 = render_surface_area_mm2(surface);
     sum->thread_count = thread_count;
-    sum->profiles = calloc(media->count, sizeof *sum->profiles);
+    sum->profiles = calloc(media->count, sizeof(struct render_profile *));
     sum->statuses = calloc(2 * object_count, sizeof *sum->statuses);
     for (int half = 0; half < 2; half++)
         sum->entries[half] = calloc(object_count, sizeof *sum->entries[half]);
@@ -326,7 +326,7 @@ static bool is_near(const struct render_sum *sum, const struct group *a, const s
 static void add_targets(const struct render_sum *sum, const struct group *groups,
                         struct render_tree_targets *targets)
 {
-    const size_t object = groups[0].object;
+    const size_t object = groups->object;
     const double chunk_count = ceil((double)sum->pass.point_count / RENDER_SUM_CHUNK);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
         targets->least[c] = sum->pass.least[c] / sum->view->media[object].exit_scale_per_sr / chunk_count;
@@ -349,7 +349,7 @@ static void add_targets(const struct render_sum *sum, const struct group *groups
 static void add_tile(const struct render_sum *sum, struct tile *tile)
 {
     while (tile->count > 0) {
-        struct group taken[RENDER_TREE_TARGETS];
+        struct group taken[RENDER_TREE_TARGETS] = { { .object = 0 } };
         struct render_tree_targets targets = { .count = 0 };
         const struct group first = tile->groups[0];
         size_t left = 0;

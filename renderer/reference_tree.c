@@ -190,12 +190,8 @@ static void add_child(const struct node *child, const struct moments *of_child, 
     }
     for (int t = 0; t < TRIPLES; t++) { /* 4 |d|^2 d e: of the triples i i k and i k k */
         const int i = triples[t][0], j = triples[t][1], k = triples[t][2];
-        if (i == j && j == k)
-            fourth += (4 * e[i]) * of_child->third[t];
-        else if (i == j)
-            fourth += (4 * e[k]) * of_child->third[t];
-        else if (j == k)
-            fourth += (4 * e[i]) * of_child->third[t];
+        if (i == j || j == k)
+            fourth += (4 * e[i == j ? k : i]) * of_child->third[t];
     }
     node->fourth += fourth;
 }
@@ -414,7 +410,8 @@ static void put(struct parts *parts, const struct part *part)
             room <= PART_LIMIT ? aligned_alloc(sizeof(render_lanes), room * sizeof *more) : NULL;
         parts->is_full = !more;
         if (more) {
-            memcpy(more, parts->at, parts->count * sizeof *more);
+            if (parts->count > 0)
+                memcpy(more, parts->at, parts->count * sizeof *more);
             free(parts->at);
             parts->at = more;
             parts->room = room;

@@ -80,7 +80,7 @@ static double library(const struct render_medium *medium, int channel, double r_
 }
 
 /* Over all media that the models know. */
-#define FOR_EACH_MEDIUM(number, model)                                                                     \
+#define FOR_EACH_MEDIUM                                                                                    \
     for (int number = 0; number < MEDIA; number++)                                                         \
         for (dipole_model model = DIPOLE_MODEL_DIPOLE; model <= DIPOLE_MODEL_MODES; model++)
 
@@ -92,7 +92,7 @@ static void tables_equal_the_library(void **state)
     (void)state;
     struct rng rng = { .seed = 1 };
     double worst = 0;
-    FOR_EACH_MEDIUM(number, model)
+    FOR_EACH_MEDIUM
     {
         struct io_material material;
         struct render_medium medium;
@@ -126,7 +126,7 @@ static void tables_equal_the_library(void **state)
 static void cores_keep_the_power(void **state)
 {
     (void)state;
-    FOR_EACH_MEDIUM(number, model)
+    FOR_EACH_MEDIUM
     {
         struct io_material material;
         struct render_medium medium;
@@ -182,7 +182,7 @@ static void bounds_hold(void **state)
     (void)state;
     struct rng rng = { .seed = 2 };
     double closest = 0;
-    FOR_EACH_MEDIUM(number, model)
+    FOR_EACH_MEDIUM
     {
         struct io_material material;
         struct render_medium medium;
@@ -311,7 +311,7 @@ static void trees_equal_all_pairs(void **state)
     (void)state;
     struct rng rng = { .seed = 3 };
     double worst = 0;
-    FOR_EACH_MEDIUM(number, model)
+    FOR_EACH_MEDIUM
     {
         struct io_material material;
         struct render_medium medium;
