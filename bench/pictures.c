@@ -35,10 +35,21 @@ static int compare(const void *a, const void *b)
     return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
 }
 
-/* In per cent: relative RMSE, and the 99th percentile of |L - L_ref|/L_ref. */
-static bool errors(const struct io_image *reference, const struct io_image *picture, bool with_edges,
-                   double *rmse, double *weber)
+static float brightest_of(const struct io_image *image)
 {
+    const size_t value_count = 4 * (size_t)image->width_px * (size_t)image->height_px;
+    float brightest = 0;
+    for (size_t i = 0; i < value_count; i++)
+        brightest = i % 4 == 3 ? brightest : fmaxf(brightest, image->pixels[i]);
+    return brightest;
+}
+
+/* In per cent: relative RMSE, and the 99th percentile of |L - L_ref|/L_ref where L_ref is above a part of
+ * the brightest. */
+static bool errors(const struct io_image *reference, const struct io_image *picture, bool with_edges,
+                   double part, double *rmse, double *weber)
+{
+    const float least = (float)part * brightest_of(reference);
     const size_t pixel_count = (size_t)reference->width_px * (size_t)reference->height_px;
     double *const relative = malloc(3 * pixel_count * sizeof *relative);
     double error2 = 0, value2 = 0;
@@ -54,7 +65,7 @@ static bool errors(const struct io_image *reference, const struct io_image *pict
             const double error = (double)found[c] - (double)expected[c];
             error2 += error * error;
             value2 += (double)expected[c] * (double)expected[c];
-            if (expected[c] > 0.0f)
+            if (expected[c] > least)
                 relative[count++] = fabs(error) / (double)expected[c];
         }
     }
@@ -67,12 +78,13 @@ static bool errors(const struct io_image *reference, const struct io_image *pict
 
 static bool print_errors(const struct io_image *reference, const struct io_image *picture)
 {
-    double rmse[2], weber[2];
     for (int i = 0; i < 2; i++) {
-        if (!errors(reference, picture, i == 1, &rmse[i], &weber[i]))
+        double rmse, weber, visible;
+        if (!errors(reference, picture, i == 1, 0, &rmse, &weber) ||
+            !errors(reference, picture, i == 1, 1e-4, &rmse, &visible))
             return false;
+        printf("%.2f | %.2f | %.2f%s", rmse, weber, visible, i == 0 ? " | " : "\n");
     }
-    printf("%.2f | %.2f | %.2f | %.2f\n", rmse[0], weber[0], rmse[1], weber[1]);
     return true;
 }
 
@@ -80,9 +92,7 @@ static bool write_difference(const struct io_image *reference, const struct io_i
                              const char *path)
 {
     const size_t pixel_count = (size_t)reference->width_px * (size_t)reference->height_px;
-    float brightest = 0;
-    for (size_t i = 0; i < 4 * pixel_count; i++)
-        brightest = i % 4 == 3 ? brightest : fmaxf(brightest, reference->pixels[i]);
+    const float brightest = brightest_of(reference);
     FILE *const file = fopen(path, "wb");
     if (!file)
         return false;
