@@ -1,9 +1,9 @@
 /*
  * How far pictures are from a reference.
- * usage: bench_pictures errors REFERENCE.exr PICTURE.exr     Markdown cells: relative RMSE and Weber's 99th
- *                                                            percentile, within objects and with their
- * edges bench_pictures difference REFERENCE.exr PICTURE.exr OUT.ppm signed: red is too bright, blue too
- * dark, full colour at 20 % of the brightest
+ * usage: bench_pictures errors REFERENCE.exr PICTURE.exr
+ *            Markdown cells in %, within objects, then with their edges: relative RMSE, Weber's 99th
+ * percentile, and that of values above 1e-4 of the brightest bench_pictures difference REFERENCE.exr
+ * PICTURE.exr OUT.ppm signed: red is too bright, blue too dark, full colour at 20 % of the brightest
  */
 #include "io/exr.h"
 
