@@ -194,9 +194,12 @@ static void settle_medium(const struct render_request *request, struct render_pl
         return;
     const double decades = log10(RING_EPSILON / plan->epsilon);
     const double ring_spacings = RING_SPACINGS + RING_SPACINGS_PER_DECADE * fmax(decades, 0);
-    /* What is captured is summed by others, from the finest samples alone. */
-    const double reach_mm = request->is_captured ? 0 : planned->r_max_mm;
-    planned->band_count = render_bands_make(planned->spacing_mm, reach_mm, ring_spacings, planned->bands);
+    /* What is captured is summed by others, from the finest samples alone; so are samples that are counted.
+     */
+    const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
+    const double reach_mm = planned->r_max_mm;
+    planned->band_count = render_bands_make(planned->spacing_mm, reach_mm,
+                                            is_single ? INFINITY : ring_spacings, planned->bands);
     plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
     if (request->is_captured)
         return;

@@ -27,6 +27,7 @@ struct random_scene {
     struct io_light lights[RANDOM_LIGHTS];
     struct io_object objects[RANDOM_OBJECTS];
     enum render_technique technique;
+    enum render_area area;
     double epsilon, spacing_mm;
     bool is_captured, is_tone_mapped;
 };
@@ -380,6 +381,7 @@ static inline void random_scene_init(struct random_scene *random, uint64_t seed,
     random->technique = techniques[random_index(&rng, (int)(sizeof techniques / sizeof *techniques))];
     random->epsilon = chance(&rng, 0.8) ? log_uniform(&rng, 3e-3, 0.1)
                                         : log_uniform(&rng, RENDER_EPSILON_MIN, RENDER_EPSILON_MAX);
+    random->area = chance(&rng, 0.1) ? RENDER_AREA_OVERLAP : RENDER_AREA_FLUX;
     random->is_captured = chance(&rng, 0.1);
     random->is_tone_mapped = chance(&rng, 0.3);
     if (random->is_captured || chance(&rng, 0.05))
@@ -398,6 +400,7 @@ static inline struct render_request random_scene_request(const struct random_sce
                                     .epsilon = random->epsilon,
                                     .spacing_mm = random->spacing_mm,
                                     .technique = random->technique,
+                                    .area = random->area,
                                     .is_captured = random->is_captured,
                                     .is_tone_mapped = random->is_tone_mapped };
 }

@@ -48,21 +48,25 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     struct test_scene test;
     init_sphere(&test);
     const struct io_material other = skin1();
-    struct render_request requests[6];
-    for (int i = 0; i < 6; i++)
+    struct render_request requests[7];
+    for (int i = 0; i < 7; i++)
         requests[i] = request_for(&test);
     requests[1].technique = RENDER_TECHNIQUE_LAMBERT;
     requests[2].is_captured = true;
     requests[3].is_tone_mapped = true;
     bool was_active[RENDER_EFFECT_LIMIT] = { false }, was_inactive[RENDER_EFFECT_LIMIT] = { false };
-    for (int i = 0; i < 6; i++) {
+    requests[6].area = RENDER_AREA_OVERLAP;
+    for (int i = 0; i < 7; i++) {
         test.objects[0].has_specular = i == 3;
         if (i == 5)
             assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 2, 5, &other));
         test.scene.light_count = i == 4 ? 0 : 1;
         struct render_plan *const plan = plan_for(&requests[i]);
         for (size_t e = 0; render_effects[e]; e++) {
-            assert_true(strlen(plan->decisions[e].reason) > 5);
+            const struct render_decision *const decision = &plan->decisions[e];
+            assert_true(strlen(decision->reason) > 5);
+            assert_true(decision->is_active ? decision->cost_ms > 0 : decision->cost_ms == 0);
+            assert_true(decision->is_active ? decision->error >= 0 : decision->error == 0);
             was_active[e] |= plan->decisions[e].is_active;
             was_inactive[e] |= !plan->decisions[e].is_active;
         }

@@ -66,6 +66,7 @@ static bool draw(const struct random_scene *random, struct render_report *report
     struct io_image *image = NULL;
     struct render_capture *captured = NULL;
     const struct render_options options = { .technique = random->technique,
+                                            .area = random->area,
                                             .epsilon = random->epsilon,
                                             .is_tone_mapped = random->is_tone_mapped };
     bool done = render_create(&random->scene, RENDER_CONTEXT_DEFAULT, &renderer, status);

@@ -1,6 +1,6 @@
 // Pass surface_resolve: one surface for each pixel, even where objects are thinner than a pixel: that of the
-// first of its points that shows an object, at the middle of all points that show the same, but no lower than
-// any of them; and its depth, 0 where no object is.
+// first of its points that shows an object, at the middle of all points that show the same; and its depth, 0
+// where no object is.
 #include "common/direction.glsl"
 #include "common/same_surface.glsl"
 uniform sampler2DMS surface_position_mm;
@@ -12,40 +12,55 @@ uniform float pixel_mm;  // size of a pixel; perspective: at distance 1
 layout(location = 0) out vec4 position_out_mm;
 layout(location = 1) out vec4 normal_out;
 
+vec4 points_mm[4], normals[4];  // w of a point that shows another surface is 0
+
+// The middle of the points that show the surface of the first of them lies below it where it is curved; on
+// average their tangent planes pass as far above. At a silhouette, where that is much of a pixel, the point
+// nearest to the middle is taken.
+void resolve(int first)
+{
+    vec3 middle_mm = vec3(0.0), middle_normal = vec3(0.0);
+    float count = 0.0, width_mm = footprint_mm(eye, pixel_mm, points_mm[first].xyz);
+    vec4 first_mm = points_mm[first];
+    for (int i = first; i < 4; i++) {
+        if (!is_same_surface(points_mm[i], normals[i].xyz, first_mm, normals[first].xyz, width_mm))
+            points_mm[i].w = 0.0;
+        if (points_mm[i].w == 0.0)
+            continue;
+        middle_mm += points_mm[i].xyz - first_mm.xyz;
+        middle_normal += normals[i].xyz;
+        count += 1.0;
+    }
+    middle_mm = first_mm.xyz + middle_mm / count;
+    vec3 rise_mm = vec3(0.0);
+    int nearest = first;
+    for (int i = first; i < 4; i++) {
+        if (points_mm[i].w == 0.0)
+            continue;
+        rise_mm += dot(points_mm[i].xyz - middle_mm, normals[i].xyz) * normals[i].xyz;
+        if (distance(points_mm[i].xyz, middle_mm) < distance(points_mm[nearest].xyz, middle_mm))
+            nearest = i;
+    }
+    rise_mm /= 2.0 * count;
+    bool is_flat = length(rise_mm) < 0.05 * width_mm;
+    position_out_mm = vec4(is_flat ? middle_mm + rise_mm : points_mm[nearest].xyz, first_mm.w);
+    normal_out = vec4(is_flat ? unit_or(middle_normal, normals[first].xyz) : normals[nearest].xyz, normals[first].w);
+}
+
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec4 points_mm[4], normals[4];
-    bool is_same[4];
     int first = 4;
     for (int i = 3; i >= 0; i--) {
         points_mm[i] = texelFetch(surface_position_mm, pixel, i);
         normals[i] = texelFetch(surface_normal, pixel, i);
-        first = points_mm[i].w > 0.0 ? i : first;
+        if (points_mm[i].w > 0.0)
+            first = i;
     }
     position_out_mm = vec4(0.0);
     normal_out = vec4(0.0);
-    gl_FragDepth = 0.0;
-    if (first == 4)
-        return;
-    vec4 first_mm = points_mm[first], first_normal = normals[first];
-    float width_mm = footprint_mm(eye, pixel_mm, first_mm.xyz), count = 0.0;
-    vec3 offset_mm = vec3(0.0), normal_sum = vec3(0.0);
-    for (int i = 0; i < 4; i++) {
-        is_same[i] = is_same_surface(points_mm[i], normals[i].xyz, first_mm, first_normal.xyz, width_mm);
-        if (is_same[i]) {
-            offset_mm += points_mm[i].xyz - first_mm.xyz;
-            normal_sum += normals[i].xyz;
-            count += 1.0;
-        }
-    }
-    vec3 normal = unit_or(normal_sum, first_normal.xyz), middle_mm = first_mm.xyz + offset_mm / max(count, 1.0);
-    // Where the surface is round, the middle lies under it and would be in its shadow.
-    float lift_mm = 0.0;
-    for (int i = 0; i < 4; i++)
-        lift_mm = is_same[i] ? max(lift_mm, dot(points_mm[i].xyz - middle_mm, normal)) : lift_mm;
-    position_out_mm = vec4(middle_mm + lift_mm * normal, first_mm.w);
-    normal_out = vec4(normal, first_normal.w);
+    if (first < 4)
+        resolve(first);
     float depth = (dot(position_out_mm.xyz - eye_ws_mm, forward_ws) - near_mm) / (far_mm - near_mm);
-    gl_FragDepth = clamp(depth, 1e-6, 1.0);
+    gl_FragDepth = position_out_mm.w > 0.0 ? clamp(depth, 1e-6, 1.0) : 0.0;
 }
