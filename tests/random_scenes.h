@@ -385,7 +385,7 @@ static inline void random_scene_init(struct random_scene *random, uint64_t seed,
     random->is_captured = chance(&rng, 0.1);
     random->is_tone_mapped = chance(&rng, 0.3);
     if (random->is_captured || chance(&rng, 0.05))
-        random->spacing_mm = size_mm * log_uniform(&rng, 1e-3, 10);
+        random->spacing_mm = size_mm * log_uniform(&rng, 1e-2, 10);
 }
 
 static inline void random_scene_end(struct random_scene *random)

@@ -122,14 +122,13 @@ static void a_random_scene_is_planned_or_refused(void **state)
                         status.code == DIPOLE_OUT_OF_MEMORY);
             print_message("  seed %llu: %s\n", (unsigned long long)seed, status.message);
         }
-        const double ms = 1e3 * (double)(clock() - start) / CLOCKS_PER_SEC;
-        if (ms > 30)
-            print_message("  seed %llu: %.0f ms\n", (unsigned long long)seed, ms);
+        if (only_seed)
+            print_message("  %.0f ms\n", 1e3 * (double)(clock() - start) / CLOCKS_PER_SEC);
         render_plan_destroy(plan);
         random_scene_end(&random);
     }
     print_message("  %zu of %llu scenes were planned\n", made_count, (unsigned long long)count);
-    assert_true(made_count >= 0.95 * (double)count || only_seed);
+    assert_true((double)made_count >= 0.95 * (double)count || only_seed);
 }
 
 int main(int argc, char **argv)

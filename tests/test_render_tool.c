@@ -57,11 +57,12 @@ static const char many_json[] =
     "false,\n"
     "                \"transform\": { \"scale\": 3, \"translate\": [6, 0, 0] } },\n"
     "              { \"primitive\": \"slab\", \"transform\": { \"scale\": 9, \"translate\": [0, -5, 0] },\n"
-    "                \"material\": { \"name\": \"coated\", \"eta\": 1.4, \"model\": \"beam\", \"layers\": [\n"
+    "                \"material\": { \"name\": \"coated\", \"eta\": 1.4, \"model\": \"beam\", \"layers\": "
+    "[\n"
     "                  { \"thickness_mm\": 0.4, \"sigma_a_per_mm\": [0.02, 0.1, 0.3],\n"
-    "                    \"sigma_s_prime_per_mm\": 3 },\n"
-    "                  { \"thickness_mm\": \"infinite\", \"sigma_a_per_mm\": 0.01,\n"
-    "                    \"sigma_s_prime_per_mm\": 1.5 }] } }] }\n";
+    "                    \"sigma_s_prime_per_mm\": [3, 3, 3] },\n"
+    "                  { \"thickness_mm\": \"infinite\", \"sigma_a_per_mm\": [0.01, 0.02, 0.01],\n"
+    "                    \"sigma_s_prime_per_mm\": [1.5, 1.5, 1.5] }] } }] }\n";
 
 /* Half way round the first camera is where the second one stands. */
 static const char turn_json[] =
