@@ -5,6 +5,7 @@
 #include "renderer/reference.h"
 #include "renderer/tables.h"
 #include "renderer/view.h"
+#include "renderer/volumes.h"
 
 #include <jansson.h>
 #include <limits.h>
@@ -17,6 +18,7 @@ struct options {
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
     int technique, context;
+    int tsm_gather, tsm_response, tsm_part, layer_pairs;
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
@@ -36,6 +38,9 @@ struct job {
 
 /* In the order of enum render_context_kind, without the default. */
 static const char *const context_names[] = { "osmesa", "egl", "window", NULL };
+
+/* Index i: 2 i surfaces, which come in pairs. */
+static const char *const layer_count_names[] = { "0", "2", "4", "6", "8", "10", "12", "14", "16", NULL };
 
 /* ---- results ------------------------------------------------------------------------------------ */
 
@@ -79,6 +84,10 @@ static void print_plan(const struct render_report *report)
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);
     }
+    if (report->map_count > 0)
+        printf(
+            "error not bounded; of the table %.3g\n%d translucent shadow map%s, up to %d texels a side\n",
+            report->table_error, report->map_count, report->map_count == 1 ? "" : "s", report->map_side_px);
     if (report->doubling_count > 0)
         printf("%12s  estimated error\n", "samples");
     for (size_t i = 0; i < report->doubling_count; i++)
@@ -206,13 +215,17 @@ static bool draw(struct job *job, dipole_status *status)
            cli_stdout_finish(status);
 }
 
-/* Of the folder that was named, if one was. */
-static bool find_tables(const struct job *job, struct render_tables **tables_out, dipole_status *status)
+/* What the technique asks of the folder that was named, if one was. */
+static bool find_tables(const struct job *job, struct render_tables **tables_out,
+                        struct render_volumes **volumes_out, dipole_status *status)
 {
+    const char *const folder = job->options->table_folder;
     struct render_media *media = NULL;
-    const bool is_done = !job->options->table_folder ||
-                         (render_media_create(job->scene, &media, status) &&
-                          render_tables_find(job->options->table_folder, media, tables_out, status));
+    bool is_done = !folder || render_media_create(job->scene, &media, status);
+    if (folder && is_done)
+        is_done = job->options->technique == RENDER_TECHNIQUE_TSM
+                      ? render_volumes_find(folder, media, volumes_out, status)
+                      : render_tables_find(folder, media, tables_out, status);
     render_media_destroy(media);
     return is_done;
 }
@@ -223,11 +236,14 @@ static bool draw_by_opengl(struct job *job, dipole_status *status)
     const enum render_context_kind kind =
         options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
     struct render_tables *tables = NULL;
-    bool is_done = find_tables(job, &tables, status);
+    struct render_volumes *volumes = NULL;
+    bool is_done = find_tables(job, &tables, &volumes, status);
     job->drawing.tables = tables ? tables->of_medium : NULL;
+    job->drawing.volumes = volumes ? (const struct lut_tsm *const *)volumes->volumes : NULL;
     is_done = is_done && render_create(job->scene, kind, &job->renderer, status) && draw(job, status);
     render_destroy(job->renderer);
     render_tables_destroy(tables);
+    render_volumes_destroy(volumes);
     return is_done;
 }
 
@@ -251,7 +267,11 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     struct job job = { .tool = tool,
                        .options = options,
                        .drawing = { .technique = (enum render_technique)options->technique,
-                                    .epsilon = options->epsilon },
+                                    .epsilon = options->epsilon,
+                                    .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
+                                             .response = (enum render_tsm_response)options->tsm_response,
+                                             .part = (enum render_tsm_part)options->tsm_part,
+                                             .layer_count = 2 * options->layer_pairs } },
                        .frame_count = options->frames[1] - options->frames[0] + 1 };
     bool is_png = false, done = false;
     if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
@@ -285,10 +305,41 @@ int main(int argc, char **argv)
           .target = &options.technique,
           .argument = "NAME",
           .help = "splat: subsurface scattering; lambert: light leaves where it enters; auto: splat, or "
-                  "lambert where scattering stays within a pixel; reference: the integral over the surface "
+                  "lambert where scattering stays within a pixel; tsm: translucent shadow maps, fast and "
+                  "rough; reference: the integral over the surface "
                   "on the "
                   "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
+        { .name = "tsm",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_gather,
+          .argument = "WHERE",
+          .help =
+              "Gather the global response of translucent shadow maps at each fragment, the default, or at "
+              "each vertex.",
+          .choices = render_tsm_gather_names },
+        { .name = "tsm-response",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_response,
+          .argument = "KIND",
+          .help =
+              "table: samples looked up in a volume, the default; exact: without a table; texels: the sum "
+              "over all texels, slow; profile: the same of the profile at the distance, as splats sum it.",
+          .choices = render_tsm_response_names },
+        { .name = "tsm-part",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_part,
+          .argument = "PART",
+          .help = "sum, the default, or the global or the local response alone.",
+          .choices = render_tsm_part_names },
+        { .name = "peel",
+          .kind = CLI_CHOICE,
+          .target = &options.layer_pairs,
+          .argument = "N",
+          .help =
+              "Tell material from air by N surfaces behind each other in translucent shadow maps, an even "
+              "number up to 16; default 0: all is taken for solid.",
+          .choices = layer_count_names },
         { .name = "epsilon",
           .letter = 'e',
           .kind = CLI_NUMBER,

@@ -1,0 +1,45 @@
+/* The global response of translucent shadow maps: light through the volume, from the samples of the
+ * pattern. */
+#include "renderer/effects.h"
+#include "renderer/tsm_draw.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    const char *const idle = render_tsm_idle_reason(request, plan);
+    if (idle)
+        return render_not_called_for("%s", idle);
+    if (request->tsm.response == RENDER_TSM_TEXELS || request->tsm.response == RENDER_TSM_PROFILE)
+        return render_not_called_for("all texels are summed");
+    if (request->tsm.gather == RENDER_TSM_VERTEX)
+        return render_not_called_for("gathered at vertices");
+    if (request->tsm.part == RENDER_TSM_LOCAL)
+        return render_not_called_for("the local part alone is asked for");
+    return render_called_for("at each fragment; what the samples miss is not bounded");
+}
+
+static void bind(const struct render_frame *frame)
+{
+    render_tsm_set_map(frame);
+    render_tsm_set_response(frame);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "tsm_global",
+      .draw = RENDER_DRAW_FULLSCREEN,
+      .is_per_map = true,
+      .is_added = true,
+      .reads = { "position_mm", "tsm_position_mm", "tsm_normal", "tsm_flux", "tsm_volume", "tsm_pattern" },
+      .reads_if_written = { "tsm_sources", "tsm_factors", "tsm_layers" },
+      .writes = { "radiosity" },
+      .bind = bind },
+};
+
+const struct render_effect render_effect_tsm_global = {
+    .name = "tsm_global",
+    .source = "Dachsbacher and Stamminger 2003, section 4",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

@@ -1,0 +1,43 @@
+/* Every texel of a translucent shadow map in place of the pattern's samples: slow, to measure what these
+ * miss. */
+#include "renderer/effects.h"
+#include "renderer/tsm_draw.h"
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    const char *const idle = render_tsm_idle_reason(request, plan);
+    if (idle)
+        return render_not_called_for("%s", idle);
+    if (request->tsm.response != RENDER_TSM_TEXELS && request->tsm.response != RENDER_TSM_PROFILE)
+        return render_not_called_for("the samples of the pattern are summed");
+    return render_called_for("response \"%s\" is asked for",
+                             render_tsm_response_names[request->tsm.response]);
+}
+
+static void bind(const struct render_frame *frame)
+{
+    render_tsm_set_map(frame);
+    render_tsm_set_response(frame);
+    render_set_float(frame->program, "map_texel_area", frame->view->texel_area);
+    render_set_int(frame->program, "is_profile", frame->request->tsm.response == RENDER_TSM_PROFILE);
+}
+
+static const struct render_pass passes[] = {
+    { .name = "tsm_texels",
+      .draw = RENDER_DRAW_FULLSCREEN,
+      .is_per_map = true,
+      .is_added = true,
+      .reads = { "position_mm", "tsm_position_mm", "tsm_normal", "tsm_flux", "tsm_sources" },
+      .writes = { "radiosity" },
+      .bind = bind },
+};
+
+const struct render_effect render_effect_tsm_texels = {
+    .name = "tsm_texels",
+    .source = "the sum that Dachsbacher and Stamminger 2003 approximate",
+    .decide = decide,
+    .passes = passes,
+    .pass_count = COUNT(passes),
+};

@@ -1,0 +1,21 @@
+// The global response: flux of the pattern's cells, each through its part of the volume (theory.md T32).
+#include "common/tsm_map.glsl"
+#include "common/tsm_response.glsl"
+#include "common/tsm_solid.glsl"
+
+vec3 tsm_global_radiosity(vec3 here_mm)
+{
+    map_plane plane = map_plane_at(here_mm);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < tsm_sample_count; i++) {
+        vec4 place = texelFetch(tsm_pattern, i);
+        map_cell cell;
+        if (!map_cell_at(plane, place.xy, place.z, cell))
+            continue;
+        vec3 delta_mm = here_mm - cell.position_mm;
+        float dz_mm = map_depth_mm(plane, here_mm, cell.position_mm);
+        vec3 response = tsm_response_per_mm2(i, place.xy, delta_mm, cell.normal, dz_mm);
+        sum += response * place.w * cell.flux_per_mm2 * tsm_solid_part(here_mm, cell.position_mm);
+    }
+    return sum;
+}

@@ -1,0 +1,139 @@
+#include "renderer/volumes.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+double render_volume_epsilon(double epsilon)
+{
+    return fmin(fmax(5 * epsilon, 0.02), 0.15);
+}
+
+static struct render_volumes *volumes_create(const struct render_media *media, dipole_status *status)
+{
+    struct render_volumes *const volumes = calloc(1, sizeof *volumes);
+    if (volumes) {
+        volumes->count = media->count;
+        volumes->volumes = calloc(media->count, sizeof *volumes->volumes);
+    }
+    if (volumes && volumes->volumes)
+        return volumes;
+    free(volumes);
+    dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the volumes of %zu media", media->count);
+    return NULL;
+}
+
+void render_volumes_destroy(struct render_volumes *volumes)
+{
+    if (!volumes)
+        return;
+    for (size_t m = 0; m < volumes->count; m++)
+        lut_tsm_destroy(volumes->volumes[m]);
+    free(volumes->volumes);
+    free(volumes);
+}
+
+bool render_volumes_bake(const struct render_media *media, double epsilon,
+                         struct render_volumes **volumes_out, dipole_status *status)
+{
+    *volumes_out = NULL;
+    struct render_volumes *const volumes = volumes_create(media, status);
+    bool is_done = volumes != NULL;
+    for (size_t m = 0; is_done && m < media->count; m++) {
+        const struct lut_request wanted = {
+            .kind = LUT_TSM, .materials = media->media[m].material, .material_count = 1, .epsilon = epsilon
+        };
+        if (media->media[m].has_scattering)
+            is_done = lut_tsm_bake(&wanted, 0, &volumes->volumes[m], status);
+    }
+    if (is_done) {
+        volumes->epsilon = epsilon;
+        *volumes_out = volumes;
+    } else {
+        render_volumes_destroy(volumes);
+    }
+    return is_done;
+}
+
+/* ---- a folder ----------------------------------------------------------------------------------- */
+
+static int select_volume(const struct dirent *entry)
+{
+    static const char suffix[] = ".tsm.exr";
+    const size_t length = strlen(entry->d_name);
+    return length >= sizeof suffix && strcmp(entry->d_name + length - (sizeof suffix - 1), suffix) == 0;
+}
+
+/* Take a volume for the medium that it is of, if it is better than what there is; else end it. */
+static void take_volume(struct lut_tsm *lut, const struct render_media *media,
+                        struct render_volumes *volumes)
+{
+    const struct lut_hash hash = lut_material_hash(&lut->material);
+    for (size_t m = 0; m < media->count; m++) {
+        struct lut_tsm **const there = &volumes->volumes[m];
+        if (strcmp(hash.text, media->media[m].hash.text) == 0 &&
+            (!*there || lut->error.max < (*there)->error.max)) {
+            lut_tsm_destroy(*there);
+            *there = lut;
+            return;
+        }
+    }
+    lut_tsm_destroy(lut);
+}
+
+static bool read_volume(const char *folder, const char *name, const struct render_media *media,
+                        struct render_volumes *volumes, dipole_status *status)
+{
+    char *path = NULL;
+    struct lut_tsm *lut = NULL;
+    if (asprintf(&path, "%s/%s", folder, name) < 0)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the path of a volume");
+    const bool is_done = lut_tsm_read(path, &lut, status);
+    if (is_done)
+        take_volume(lut, media, volumes);
+    free(path);
+    return is_done;
+}
+
+static bool check_found(const char *folder, const struct render_media *media,
+                        const struct render_volumes *volumes, int file_count, dipole_status *status)
+{
+    const dipole_place place = { .source = folder };
+    for (size_t m = 0; m < media->count; m++) {
+        if (!volumes->volumes[m] && media->media[m].has_scattering)
+            return dipole_fail(
+                status, DIPOLE_NOT_FOUND, &place,
+                "no volume of material \"%s\" (material_hash %s) among %d *.tsm.exr; bake one with "
+                "lutgen --kind tsm",
+                media->media[m].material->name, media->media[m].hash.text, file_count);
+    }
+    return true;
+}
+
+bool render_volumes_find(const char *folder, const struct render_media *media,
+                         struct render_volumes **volumes_out, dipole_status *status)
+{
+    const dipole_place place = { .source = folder };
+    struct dirent **entries = NULL;
+    *volumes_out = NULL;
+    const int count = scandir(folder, &entries, select_volume, alphasort);
+    if (count < 0)
+        return dipole_fail(status, DIPOLE_NOT_FOUND, &place, "cannot list the folder of tables: %s",
+                           strerror(errno));
+    struct render_volumes *const volumes = volumes_create(media, status);
+    bool is_done = volumes != NULL;
+    for (int i = 0; i < count; i++) {
+        is_done = is_done && read_volume(folder, entries[i]->d_name, media, volumes, status);
+        free(entries[i]);
+    }
+    free(entries);
+    if (is_done && check_found(folder, media, volumes, count, status)) {
+        *volumes_out = volumes;
+        return true;
+    }
+    render_volumes_destroy(volumes);
+    return false;
+}

@@ -1,0 +1,29 @@
+/* Volumes for translucent shadow maps of a scene's media: from a folder, or baked in memory. */
+#ifndef RENDERER_VOLUMES_H
+#define RENDERER_VOLUMES_H
+
+#include "renderer/media.h"
+
+/* End it with render_volumes_destroy. */
+struct render_volumes {
+    double epsilon;           /* asked of them; 0 of a folder's */
+    size_t count;             /* of media                       */
+    struct lut_tsm **volumes; /* of each medium; NULL where nothing scatters */
+};
+
+/* What is asked of a volume for a picture of that epsilon: the interpolation along its depth, worst near
+ * sources, costs more texels than it is worth to a sum of so few samples. */
+double render_volume_epsilon(double epsilon);
+
+/* A volume for each medium. Fails as lut_tsm_bake does. */
+DIPOLE_CHECKED bool render_volumes_bake(const struct render_media *media, double epsilon,
+                                        struct render_volumes **volumes_out, dipole_status *status);
+
+/* Read each medium's volume among the *.tsm.exr of a folder; of several, the most exact. Fails with
+ * DIPOLE_NOT_FOUND (no such folder or volume), or as lut_tsm_read does. */
+DIPOLE_CHECKED bool render_volumes_find(const char *folder, const struct render_media *media,
+                                        struct render_volumes **volumes_out, dipole_status *status);
+
+void render_volumes_destroy(struct render_volumes *volumes);
+
+#endif
