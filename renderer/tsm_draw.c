@@ -310,6 +310,13 @@ void render_tsm_set_response(const struct render_frame *frame)
     render_set_float(frame->program, "mean_free_path_mm", shortest_mm);
 }
 
+int render_tsm_source_count(const struct render_frame *frame)
+{
+    const int *const counts =
+        render_executor_tsm(frame->executor)->of_medium[medium_of(frame)].source_counts;
+    return counts[0] + counts[1] + counts[2];
+}
+
 const char *render_tsm_idle_reason(const struct render_request *request, const struct render_plan *plan)
 {
     if (request->is_captured)

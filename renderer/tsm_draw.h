@@ -26,6 +26,9 @@ DIPOLE_CHECKED bool render_tsm_peel(const struct render_frame *frame, dipole_sta
 void render_tsm_set_map(const struct render_frame *frame);
 void render_tsm_set_response(const struct render_frame *frame);
 
+/* Sources of the map's medium, of all channels, once it has been asked for them. */
+int render_tsm_source_count(const struct render_frame *frame);
+
 /* For decide(): why technique tsm has nothing to do, or NULL. */
 const char *render_tsm_idle_reason(const struct render_request *request, const struct render_plan *plan);
 

@@ -24,14 +24,32 @@ static void bind(const struct render_frame *frame)
     render_set_int(frame->program, "is_profile", frame->request->tsm.response == RENDER_TSM_PROFILE);
 }
 
+/* Mesa's software renderer leaves a shader's loops after 65535 rounds, counted over all of them. */
+enum { ROUND_LIMIT = 60000, ROUNDS_PER_TEXEL = 12 };
+
+static bool draw(const struct render_frame *frame, dipole_status *status)
+{
+    (void)status;
+    const int texel_count = frame->view->size_px * frame->view->size_px;
+    const int step = ROUND_LIMIT / (ROUNDS_PER_TEXEL + render_tsm_source_count(frame));
+    for (int first = 0; first < texel_count; first += step) {
+        render_set_int(frame->program, "first_texel", first);
+        render_set_int(frame->program, "texel_count",
+                       first + step < texel_count ? step : texel_count - first);
+        render_draw_fullscreen(frame);
+    }
+    return true;
+}
+
 static const struct render_pass passes[] = {
     { .name = "tsm_texels",
-      .draw = RENDER_DRAW_FULLSCREEN,
+      .draw = RENDER_DRAW_BY_RUN,
       .is_per_map = true,
       .is_added = true,
       .reads = { "position_mm", "tsm_position_mm", "tsm_normal", "tsm_flux", "tsm_sources" },
       .writes = { "radiosity" },
-      .bind = bind },
+      .bind = bind,
+      .run = draw },
 };
 
 const struct render_effect render_effect_tsm_texels = {

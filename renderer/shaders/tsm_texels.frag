@@ -4,6 +4,7 @@
 #include "common/tsm_sources.glsl"
 uniform sampler2D position_mm;
 uniform float map_texel_area;  // mm^2; point light: at distance 1
+uniform int first_texel, texel_count;  // of the map, in this draw call
 uniform int is_profile;        // 1: the profile of a flat surface at the distance, whatever the normal
 layout(location = 0) out vec4 radiosity_w_per_mm2;
 
@@ -14,7 +15,7 @@ void main()
         discard;
     vec3 sum = vec3(0.0);
     int side = int(map_size_px);
-    for (int i = 0; i < side * side; i++) {
+    for (int i = first_texel; i < first_texel + texel_count; i++) {
         ivec2 texel = ivec2(i % side, i / side);
         vec3 flux = texelFetch(tsm_flux, texel, 0).rgb;
         if (flux == vec3(0.0))
