@@ -198,9 +198,10 @@ DIPOLE_CHECKED bool lut_tsm_audit(const struct lut_tsm *lut, int depth_count, un
  */
 struct lut_tsm_exact {
     dipole_sources sources[IO_CHANNEL_COUNT];
-    int node_count; /* of depth: dz = scale sinh(v asinh(max/scale)), v = 2k/(node_count - 1) - 1 */
-    float *rgb; /* sample_count rows of node_count factors, scale and max depth_scale_mm and depth_max_mm;
-                   then the local depth factor, with local_depth_scale_mm and inner_mm */
+    int node_count; /* of depth: dz = depth_scale sinh(v asinh(depth_max/depth_scale)), v = 2k/(node_count -
+                     * 1) - 1
+                     */
+    float *rgb;     /* sample_count rows of node_count factors */
 };
 
 /* node_count 2 to 65536. Fails with DIPOLE_OUT_OF_MEMORY or as lut_tsm_bake does. */

@@ -42,10 +42,6 @@ static void factors_fill(const struct lut_tsm_plan *plan, const struct lut_tsm_w
                 exact->rgb[(i * count + k) * IO_CHANNEL_COUNT + (size_t)c] =
                     (float)(lut_tsm_global_part(plan, (int)i, dz_mm) *
                             factor_at(plan, c, (int)i, dz_mm, work));
-            const double near_mm =
-                node_depth_mm((int)k, exact->node_count, lut->local_depth_scale_mm, lut->inner_mm);
-            exact->rgb[(samples * count + k) * IO_CHANNEL_COUNT + (size_t)c] =
-                (float)(lut_tsm_proximity(lut, near_mm) * lut_tsm_inner_part(plan, c, near_mm, work));
         }
     }
 }
@@ -60,7 +56,7 @@ bool lut_tsm_exact_create(const struct lut_tsm *lut, int node_count, struct lut_
     *exact_out = NULL;
     struct lut_tsm_exact *const exact = calloc(1, sizeof *exact);
     if (exact)
-        exact->rgb = calloc(((size_t)lut->sample_count + 1) * (size_t)node_count,
+        exact->rgb = calloc((size_t)lut->sample_count * (size_t)node_count,
                             IO_CHANNEL_COUNT * sizeof *exact->rgb);
     bool is_done = exact && exact->rgb;
     if (!is_done)

@@ -22,6 +22,8 @@ static const struct render_texture textures[] = {
     { .name = "light_samples", .format = RENDER_OTHER },
     { .name = "tsm_volume", .format = RENDER_OTHER },  /* of the map's medium                        */
     { .name = "tsm_pattern", .format = RENDER_OTHER }, /* the places of its samples                  */
+    { .name = "tsm_form", .format = RENDER_OTHER },    /* of the local response: R by distance, cosine */
+    { .name = "tsm_kernel", .format = RENDER_OTHER },  /* its cells                                  */
     { .name = "tsm_sources", .format = RENDER_OTHER }, /* of its medium, instead of the volume       */
     { .name = "tsm_factors", .format = RENDER_OTHER },
     { .name = "tsm_position_mm", .size = RENDER_SIZE_MAP, .is_mipmapped = true }, /* times w = coverage */

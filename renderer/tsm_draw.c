@@ -7,14 +7,14 @@
 /* Nodes of the exact response along the depth: linear between them errs by some 1e-5. */
 enum { FACTOR_NODES = 2049 };
 
-/* Slices of a volume behind those of the samples (lutgen/lut.h). */
-enum { KERNEL_SLICE = 0, DEPTH_FACTOR_SLICE = 1 };
+/* Texels of the form of T30 by distance and cosine. */
+enum { FORM_DISTANCES = 256, FORM_COSINES = 128 };
 
 /* Of one medium. */
 struct medium_tables {
     const struct lut_tsm *lut; /* that the textures hold; NULL: none */
-    GLuint volume;
-    struct render_buffer_texture pattern;
+    GLuint volume, form;
+    struct render_buffer_texture pattern, kernel;
     const struct lut_tsm *exact_lut; /* the same of the sources */
     struct render_buffer_texture sources, factors;
     int source_counts[IO_CHANNEL_COUNT];
@@ -59,7 +59,9 @@ void render_tsm_destroy(struct render_tsm *tsm)
     for (size_t m = 0; m < tsm->medium_count; m++) {
         struct medium_tables *const tables = &tsm->of_medium[m];
         delete_texture(&tables->volume);
+        delete_texture(&tables->form);
         render_buffer_texture_destroy(&tables->pattern);
+        render_buffer_texture_destroy(&tables->kernel);
         render_buffer_texture_destroy(&tables->sources);
         render_buffer_texture_destroy(&tables->factors);
     }
@@ -109,6 +111,74 @@ static void pattern_fill(const struct lut_tsm *lut, struct render_buffer_texture
     render_buffer_texture_fill(pattern, GL_RGBA32F, texels, (size_t)lut->sample_count * sizeof *texels);
 }
 
+/* How far a cell of the local response may lie: as deep as its proximity reaches, or a little more. */
+static double form_reach_mm(const struct lut_tsm *lut)
+{
+    return 2 * lut->inner_mm;
+}
+
+/* Row after row of one cosine, -1 to 1; distances scale sinh(u asinh(reach/scale)). */
+static bool form_create(const struct lut_tsm *lut, const struct lut_tsm_exact *exact, GLuint *texture_out,
+                        dipole_status *status)
+{
+    float(*const texels)[FORM_DISTANCES][3] = calloc(FORM_COSINES, sizeof *texels);
+    double cosines[FORM_COSINES], values[FORM_COSINES];
+    const double scale_mm = lut->local_depth_scale_mm, end = asinh(form_reach_mm(lut) / scale_mm);
+    if (!texels)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a local response");
+    for (int i = 0; i < FORM_COSINES; i++)
+        cosines[i] = 2.0 * i / (FORM_COSINES - 1) - 1;
+    for (int k = 0; k < FORM_DISTANCES; k++) {
+        const double distance_mm = scale_mm * sinh(end * k / (FORM_DISTANCES - 1));
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            dipole_sources_profile_per_mm2(&exact->sources[c], distance_mm, cosines, FORM_COSINES, values);
+            for (int i = 0; i < FORM_COSINES; i++)
+                texels[i][k][c] = (float)values[i];
+        }
+    }
+    glCreateTextures(GL_TEXTURE_2D, 1, texture_out);
+    glTextureStorage2D(*texture_out, 1, GL_RGB32F, FORM_DISTANCES, FORM_COSINES);
+    glTextureSubImage2D(*texture_out, 0, 0, 0, FORM_DISTANCES, FORM_COSINES, GL_RGB, GL_FLOAT, texels);
+    glTextureParameteri(*texture_out, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTextureParameteri(*texture_out, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTextureParameteri(*texture_out, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTextureParameteri(*texture_out, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    free(texels);
+    return true;
+}
+
+/* Of each cell of the local response, its mean over what it is at the middle, times its area. */
+static void kernel_fill(const struct lut_tsm *lut, const struct lut_tsm_exact *exact,
+                        struct render_buffer_texture *kernel)
+{
+    enum { SIDE = LUT_TSM_LOCAL_SIDE };
+    const double cell_mm = lut->inner_mm / SIDE, flat = 0;
+    float texels[SIDE * SIDE][4] = { 0 };
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const int x = i % SIDE - SIDE / 2, y = i / SIDE - SIDE / 2;
+        double mean[IO_CHANNEL_COUNT];
+        lut_tsm_local_kernel(lut, x, y, mean);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            double middle;
+            dipole_sources_profile_per_mm2(&exact->sources[c], cell_mm * sqrt(x * x + y * y), &flat, 1,
+                                           &middle);
+            texels[i][c] = middle > 0 ? (float)(mean[c] / middle * cell_mm * cell_mm) : 0;
+        }
+    }
+    render_buffer_texture_fill(kernel, GL_RGBA32F, texels, sizeof texels);
+}
+
+static bool local_fill(const struct lut_tsm *lut, struct medium_tables *tables, dipole_status *status)
+{
+    struct lut_tsm_exact *exact = NULL;
+    const bool is_done =
+        lut_tsm_exact_create(lut, 2, &exact, status) && form_create(lut, exact, &tables->form, status);
+    if (is_done)
+        kernel_fill(lut, exact, &tables->kernel);
+    lut_tsm_exact_destroy(exact);
+    return is_done;
+}
+
 bool render_tsm_use_volume(const struct render_frame *frame, dipole_status *status)
 {
     struct render_tsm *tsm;
@@ -117,11 +187,18 @@ bool render_tsm_use_volume(const struct render_frame *frame, dipole_status *stat
     const size_t medium = medium_of(frame);
     struct medium_tables *const tables = &tsm->of_medium[medium];
     if (tables->lut != frame->volumes[medium]) {
+        const struct lut_tsm *const lut = frame->volumes[medium];
         delete_texture(&tables->volume);
-        tables->lut = frame->volumes[medium];
-        tables->volume = volume_create(tables->lut);
-        pattern_fill(tables->lut, &tables->pattern);
+        delete_texture(&tables->form);
+        tables->lut = NULL;
+        if (!local_fill(lut, tables, status))
+            return false;
+        tables->volume = volume_create(lut);
+        pattern_fill(lut, &tables->pattern);
+        tables->lut = lut;
     }
+    render_executor_hand_on(frame->executor, "tsm_form", tables->form);
+    render_executor_hand_on(frame->executor, "tsm_kernel", tables->kernel.texture);
     render_executor_hand_on(frame->executor, "tsm_volume", tables->volume);
     render_executor_hand_on(frame->executor, "tsm_pattern", tables->pattern.texture);
     return true;
@@ -156,7 +233,7 @@ static bool exact_fill(struct medium_tables *tables, const struct lut_tsm *lut, 
     struct lut_tsm_exact *exact = NULL;
     bool is_done = lut_tsm_exact_create(lut, FACTOR_NODES, &exact, status);
     if (is_done) {
-        const size_t count = (size_t)(lut->sample_count + 1) * FACTOR_NODES * IO_CHANNEL_COUNT;
+        const size_t count = (size_t)lut->sample_count * FACTOR_NODES * IO_CHANNEL_COUNT;
         render_buffer_texture_fill(&tables->factors, GL_RGB32F, exact->rgb, count * sizeof *exact->rgb);
         is_done = sources_fill(exact, &tables->sources, status);
         for (int c = 0; c < IO_CHANNEL_COUNT; c++)
@@ -282,11 +359,10 @@ static void set_table(GLuint program, const struct lut_tsm *lut)
     render_set_float(program, "tsm_table.depth_scale_mm", lut->depth_scale_mm);
     render_set_float(program, "tsm_table.depth_max_mm", lut->depth_max_mm);
     render_set_vec3(program, "tsm_table.scale", lut->scale);
-    render_set_int(program, "tsm_table.local_slice", lut->sample_count + KERNEL_SLICE);
-    render_set_int(program, "tsm_table.depth_factor_slice", lut->sample_count + DEPTH_FACTOR_SLICE);
-    render_set_float(program, "tsm_table.local_width_mm", lut->inner_mm / LUT_TSM_LOCAL_SIDE);
-    render_set_float(program, "tsm_table.local_depth_scale_mm", lut->local_depth_scale_mm);
-    render_set_float(program, "tsm_table.inner_mm", lut->inner_mm);
+    render_set_float(program, "local_width_mm", lut->inner_mm / LUT_TSM_LOCAL_SIDE);
+    render_set_float(program, "local_scale_mm", lut->local_depth_scale_mm);
+    render_set_float(program, "local_reach_mm", form_reach_mm(lut));
+    render_set_float(program, "inner_mm", lut->inner_mm);
 }
 
 void render_tsm_set_response(const struct render_frame *frame)

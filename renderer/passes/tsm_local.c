@@ -28,8 +28,9 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_FULLSCREEN,
       .is_per_map = true,
       .is_added = true,
-      .reads = { "position_mm", "tsm_position_mm", "tsm_normal", "tsm_flux", "tsm_volume" },
-      .reads_if_written = { "tsm_sources", "tsm_factors" },
+      .reads = { "position_mm", "tsm_position_mm", "tsm_normal", "tsm_flux", "tsm_pattern", "tsm_form",
+                 "tsm_kernel" },
+      .reads_if_written = { "tsm_sources" },
       .writes = { "radiosity" },
       .bind = bind },
 };

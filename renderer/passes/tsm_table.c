@@ -13,7 +13,7 @@ static struct render_decision decide(const struct render_request *request, const
     if (request->tsm.response == RENDER_TSM_TEXELS || request->tsm.response == RENDER_TSM_PROFILE)
         return render_not_called_for("all texels are summed");
     if (request->tsm.response == RENDER_TSM_EXACT)
-        return render_called_for("for the places of the samples, and the local kernel");
+        return render_called_for("for the places of the samples");
     return render_called_for("volumes are within %.2g of the response", plan->table_error);
 }
 
@@ -21,7 +21,7 @@ static const struct render_pass passes[] = {
     { .name = "tsm_table",
       .draw = RENDER_DRAW_NOTHING,
       .is_per_map = true,
-      .writes = { "tsm_volume", "tsm_pattern" },
+      .writes = { "tsm_volume", "tsm_pattern", "tsm_form", "tsm_kernel" },
       .run = render_tsm_use_volume },
 };
 

@@ -6,7 +6,7 @@ uniform samplerBuffer tsm_pattern;  // offset, width and area of each sample
 uniform int tsm_sample_count;
 #ifdef HAS_TSM_SOURCES
 #include "common/tsm_sources.glsl"
-uniform samplerBuffer tsm_factors;  // of the depth: a row for each sample, and one for the local response
+uniform samplerBuffer tsm_factors;  // of the depth: a row for each sample
 uniform int tsm_factor_nodes;
 
 vec3 tsm_factor(int row, float dz_mm, float scale_mm, float max_mm)
@@ -28,23 +28,9 @@ vec3 tsm_response_per_mm2(int sample_index, vec2 offset_mm, vec3 delta_mm, vec3 
            tsm_factor(sample_index, dz_mm, tsm_table.depth_scale_mm, tsm_table.depth_max_mm);
 }
 
-vec3 tsm_local_response(ivec2 cell, float dz_mm)
-{
-    if (!(abs(dz_mm) <= tsm_table.inner_mm))
-        return vec3(0.0);
-    vec3 kernel_per_mm2 =
-        dipole_tsm_texel(tsm_volume, tsm_table, float(cell.x), float(cell.y), tsm_table.local_slice) * tsm_table.scale;
-    return kernel_per_mm2 * tsm_factor(tsm_sample_count, dz_mm, tsm_table.local_depth_scale_mm, tsm_table.inner_mm) *
-           (tsm_table.local_width_mm * tsm_table.local_width_mm);
-}
 #else
 vec3 tsm_response_per_mm2(int sample_index, vec2 offset_mm, vec3 delta_mm, vec3 normal, float dz_mm)
 {
     return dipole_tsm_response_per_mm2(tsm_volume, tsm_table, sample_index, delta_mm, normal, dz_mm);
-}
-
-vec3 tsm_local_response(ivec2 cell, float dz_mm)
-{
-    return dipole_tsm_local(tsm_volume, tsm_table, cell, dz_mm);
 }
 #endif
