@@ -68,10 +68,10 @@ void main()
         if (part == 0.0 || !map_cell_at(plane, offset_mm, local_width_mm, cell))
             continue;
         vec3 delta_mm = here_mm.xyz - cell.position_mm;
-        float distance_mm = length(delta_mm), dz_mm = map_depth_mm(plane, here_mm.xyz, cell.position_mm);
-        float cosine = distance_mm > 0.0 ? clamp(dot(cell.normal, delta_mm) / distance_mm, -1.0, 1.0) : 0.0;
-        float cell_distance_mm = sqrt(dot(offset_mm, offset_mm) + dz_mm * dz_mm);
-        sum += part * texelFetch(tsm_kernel, i).rgb * local_form_per_mm2(cell_distance_mm, cosine) * cell.flux_per_mm2;
+        float distance_mm = map_distance_mm(offset_mm, map_depth_mm(plane, here_mm.xyz, cell.position_mm));
+        vec3 normal = map_normal(cell, delta_mm, distance_mm);
+        float cosine = clamp(dot(normal, delta_mm) / max(length(delta_mm), 1e-20), -1.0, 1.0);
+        sum += part * texelFetch(tsm_kernel, i).rgb * local_form_per_mm2(distance_mm, cosine) * cell.flux_per_mm2;
     }
     radiosity_w_per_mm2 = vec4(sum, 0.0);
 }

@@ -12,9 +12,10 @@ vec3 tsm_global_radiosity(vec3 here_mm)
         map_cell cell;
         if (!map_cell_at(plane, place.xy, place.z, cell))
             continue;
-        vec3 delta_mm = here_mm - cell.position_mm;
         float dz_mm = map_depth_mm(plane, here_mm, cell.position_mm);
-        vec3 response = tsm_response_per_mm2(i, place.xy, delta_mm, cell.normal, dz_mm);
+        vec3 delta_mm = here_mm - cell.position_mm;
+        vec3 normal = map_normal(cell, delta_mm, map_distance_mm(place.xy, dz_mm));
+        vec3 response = tsm_response_per_mm2(i, place.xy, delta_mm, normal, dz_mm);
         sum += response * place.w * cell.flux_per_mm2 * tsm_solid_part(here_mm, cell.position_mm);
     }
     return sum;

@@ -103,3 +103,17 @@ bool map_cell_at(map_plane plane, vec2 offset_mm, float width_mm, out map_cell c
     cell.flux_per_mm2 = textureLod(tsm_flux, at.xy, at.z).rgb * map_flux_scale(plane, place_mm);
     return true;
 }
+
+// The response to a cell is that at the distance of its middle, and depends on how high the point is over the
+// surface where light enters. What the cell covers may lie to one side, and nearer: the height must not count as
+// if it were as far away. So the normal is shortened by as much.
+float map_distance_mm(vec2 offset_mm, float dz_mm)
+{
+    return sqrt(dot(offset_mm, offset_mm) + dz_mm * dz_mm);
+}
+
+vec3 map_normal(map_cell cell, vec3 delta_mm, float distance_mm)
+{
+    float nearer = length(delta_mm) / max(distance_mm, 1e-20);
+    return cell.normal * min(nearer, 1.0);
+}

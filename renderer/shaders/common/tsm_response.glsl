@@ -23,8 +23,7 @@ vec3 tsm_response_per_mm2(int sample_index, vec2 offset_mm, vec3 delta_mm, vec3 
         return vec3(0.0);
     float distance_mm = length(delta_mm);
     float cosine = distance_mm > 0.0 ? clamp(dot(normal, delta_mm) / distance_mm, -1.0, 1.0) : 0.0;
-    float cell_distance_mm = sqrt(dot(offset_mm, offset_mm) + dz_mm * dz_mm);
-    return tsm_form_per_mm2(cell_distance_mm, cosine) *
+    return tsm_form_per_mm2(map_distance_mm(offset_mm, dz_mm), cosine) *
            tsm_factor(sample_index, dz_mm, tsm_table.depth_scale_mm, tsm_table.depth_max_mm);
 }
 
