@@ -53,7 +53,8 @@ struct map_cell {
     vec3 flux_per_mm2;         // mean over the cell
 };
 
-// Where a point falls in the texture, and the level of detail whose texels are as wide there.
+// Where a point falls in the texture, and the level of detail that averages over such a width there: a filtered
+// texel is the mean over twice its own width.
 vec3 map_place(vec3 place_mm, float width_mm)
 {
     vec4 clip = map_view_projection * vec4(place_mm, 1.0);
@@ -64,7 +65,7 @@ vec3 map_place(vec3 place_mm, float width_mm)
         float deep = dot(ray, map_forward);
         texel_mm *= deep * sqrt(deep * inversesqrt(dot(ray, ray)));
     }
-    return vec3(at, log2(width_mm / texel_mm));
+    return vec3(at, log2(width_mm / texel_mm) - 1.0);
 }
 
 // Whether there is light to look up: of a cube's six maps only one is asked for each cell.
