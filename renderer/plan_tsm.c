@@ -26,7 +26,7 @@ enum {
 #define SINGLE_MAP_ANGLE_RAD (100 * PI / 180)
 
 /* Faces of a cube overlap by so much: what a sample next to an edge averages is seen whole. */
-#define CUBE_HALF_WIDTH 1.3
+#define CUBE_HALF_WIDTH 2.0
 
 static bool is_all_texels(enum render_tsm_response response)
 {

@@ -372,17 +372,19 @@ void render_tsm_set_response(const struct render_frame *frame)
     const struct lut_tsm *const lut = frame->volumes[index];
     const struct render_tsm *const tsm = render_executor_tsm(frame->executor);
     const int *const counts = tsm->of_medium[index].source_counts;
-    double shortest_mm = INFINITY;
+    double shortest_mm = INFINITY, decay_per_mm[IO_CHANNEL_COUNT] = { 0 };
     glProgramUniform3i(frame->program, glGetUniformLocation(frame->program, "tsm_source_counts"), counts[0],
                        counts[1], counts[2]);
     set_table(frame->program, lut);
     render_set_int(frame->program, "tsm_sample_count", lut->sample_count);
     render_set_int(frame->program, "tsm_factor_nodes", FACTOR_NODES);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const dipole_coefficients *const top = dipole_stack_coefficients(medium->stacks[c], 0);
+        decay_per_mm[c] = top->sigma_tr_per_mm;
         if (medium->diffuse_reflectance[c] > 0)
-            shortest_mm =
-                fmin(shortest_mm, dipole_stack_coefficients(medium->stacks[c], 0)->mean_free_path_mm);
+            shortest_mm = fmin(shortest_mm, top->mean_free_path_mm);
     }
+    render_set_vec3(frame->program, "tsm_decay_per_mm", decay_per_mm);
     render_set_float(frame->program, "mean_free_path_mm", shortest_mm);
 }
 

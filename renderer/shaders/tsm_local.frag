@@ -53,7 +53,7 @@ void main()
     for (int i = 0; i < 5; i++) {
         vec4 place = texelFetch(tsm_pattern, i);
         map_cell cell;
-        near[i] = map_cell_at(plane, place.xy, place.z, cell)
+        near[i] = map_cell_shown(plane, place.xy, place.z, cell)
                       ? proximity(map_depth_mm(plane, here_mm.xyz, cell.position_mm))
                       : 0.0;
     }

@@ -50,6 +50,7 @@ float map_depth_mm(map_plane plane, vec3 a_mm, vec3 b_mm)
 // What is in one cell of it.
 struct map_cell {
     vec3 position_mm, normal;  // means of what is covered
+    vec3 middle_mm;            // a point of the surface, in the middle where that is covered
     vec3 flux_per_mm2;         // mean over the cell
 };
 
@@ -74,7 +75,7 @@ bool map_holds(vec3 place_mm)
     if (light.w == 0.0)
         return true;
     vec3 ray = place_mm - light.xyz;
-    return map_cube_face >= 0 ? map_face(ray) == map_cube_face : dot(ray, map_forward) > 0.0;
+    return map_cube_face < 0 || map_face(ray) == map_cube_face;
 }
 
 // Flux per mm^2 of the plane for each unit in the map.
@@ -87,11 +88,12 @@ float map_flux_scale(map_plane plane, vec3 place_mm)
     return plane.distance_mm / (d2 * sqrt(d2));
 }
 
-// A cell about offset_mm from the plane's point; false where no light enters.
-bool map_cell_at(map_plane plane, vec2 offset_mm, float width_mm, out map_cell cell)
+// A cell about offset_mm from the plane's point as this map shows it, whichever of a cube's is asked for it; false
+// where no light enters.
+bool map_cell_shown(map_plane plane, vec2 offset_mm, float width_mm, out map_cell cell)
 {
     vec3 place_mm = plane.here_mm + offset_mm.x * plane.u + offset_mm.y * plane.v;
-    if (!map_holds(place_mm))
+    if (light.w > 0.0 && dot(place_mm - light.xyz, map_forward) <= 0.0)
         return false;
     vec3 at = map_place(place_mm, width_mm);
     vec4 position = textureLod(tsm_position_mm, at.xy, at.z);
@@ -100,9 +102,18 @@ bool map_cell_at(map_plane plane, vec2 offset_mm, float width_mm, out map_cell c
     if (position.w < 1e-6 || length2 < 1e-14)
         return false;
     cell.position_mm = map_centre_mm + position.xyz / position.w;
+    vec4 middle = textureLod(tsm_position_mm, at.xy, 0.0);
+    cell.middle_mm = middle.w > 0.999 ? map_centre_mm + middle.xyz : cell.position_mm;
     cell.normal = normal_sum * inversesqrt(length2);
     cell.flux_per_mm2 = textureLod(tsm_flux, at.xy, at.z).rgb * map_flux_scale(plane, place_mm);
     return true;
+}
+
+// The same if this map is asked for it.
+bool map_cell_at(map_plane plane, vec2 offset_mm, float width_mm, out map_cell cell)
+{
+    return map_holds(plane.here_mm + offset_mm.x * plane.u + offset_mm.y * plane.v) &&
+           map_cell_shown(plane, offset_mm, width_mm, cell);
 }
 
 // The response to a cell is that at the distance of its middle, and depends on how high the point is over the

@@ -4,6 +4,7 @@ uniform dipole_tsm tsm_table;
 uniform sampler3D tsm_volume;
 uniform samplerBuffer tsm_pattern;  // offset, width and area of each sample
 uniform int tsm_sample_count;
+uniform vec3 tsm_decay_per_mm;      // sigma_tr
 #ifdef HAS_TSM_SOURCES
 #include "common/tsm_sources.glsl"
 uniform samplerBuffer tsm_factors;  // of the depth: a row for each sample
@@ -19,14 +20,11 @@ vec3 tsm_factor(int row, float dz_mm, float scale_mm, float max_mm)
 
 vec3 tsm_response_per_mm2(int sample_index, vec2 offset_mm, vec3 delta_mm, vec3 normal, float dz_mm)
 {
-    if (!(abs(dz_mm) <= tsm_table.depth_max_mm))
-        return vec3(0.0);
     float distance_mm = length(delta_mm);
     float cosine = distance_mm > 0.0 ? clamp(dot(normal, delta_mm) / distance_mm, -1.0, 1.0) : 0.0;
     return tsm_form_per_mm2(map_distance_mm(offset_mm, dz_mm), cosine) *
            tsm_factor(sample_index, dz_mm, tsm_table.depth_scale_mm, tsm_table.depth_max_mm);
 }
-
 #else
 vec3 tsm_response_per_mm2(int sample_index, vec2 offset_mm, vec3 delta_mm, vec3 normal, float dz_mm)
 {
