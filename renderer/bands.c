@@ -46,35 +46,20 @@ struct lut_axis render_bands_axis(const struct render_band_source *source)
     return axis;
 }
 
-/* Change of a channel by the blur where that is small: blur^2/2 times the Laplacian, which in log r is the
- * second derivative over r^2. */
-static double blurred_far(const struct render_band_source *source, int channel, double r_mm)
-{
-    const double step = 0.1, r_max_mm = source->table->rows[source->row].axis.r_max_mm;
-    double below[IO_CHANNEL_COUNT], here[IO_CHANNEL_COUNT], above[IO_CHANNEL_COUNT];
-    lut_splat_sample(source->table, source->row, r_mm, here);
-    if (r_mm * exp(step) > r_max_mm)
-        return here[channel];
-    lut_splat_sample(source->table, source->row, r_mm * exp(-step), below);
-    lut_splat_sample(source->table, source->row, r_mm * exp(step), above);
-    const double second = (above[channel] - 2 * here[channel] + below[channel]) / (step * step);
-    const double part = source->blur_mm / r_mm;
-    return here[channel] + 0.5 * part * part * second;
-}
-
+/* Put the blurred profile in place of the sharp one, where a channel is to be blurred and they differ. */
 static bool blur(const struct render_band_source *source, const struct lut_axis *axis,
                  double (*profile)[IO_CHANNEL_COUNT], dipole_status *status)
 {
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         struct render_footprint *footprint = NULL;
-        if (!(source->medium->diffuse_reflectance[c] > 0))
+        if (!(source->blur_mm[c] > 0))
             continue;
-        if (!render_footprint_create(source->medium->stacks[c], source->blur_mm, &footprint, status))
+        if (!render_footprint_create(source->medium->stacks[c], source->blur_mm[c], &footprint, status))
             return false;
         for (int i = 0; i < axis->node_count; i++) {
             const double r_mm = fmin(lut_axis_r_mm(axis, i), axis->r_max_mm);
-            profile[i][c] = r_mm <= footprint->reach_mm ? render_footprint_sample(footprint, r_mm)
-                                                        : blurred_far(source, c, r_mm);
+            if (r_mm <= footprint->reach_mm)
+                profile[i][c] = render_footprint_sample(footprint, r_mm);
         }
         free(footprint);
     }
@@ -93,7 +78,7 @@ bool render_bands_bake(const struct render_band_source *source, const struct ren
     for (int i = 0; i < axis.node_count; i++)
         lut_splat_sample(source->table, source->row, fmin(lut_axis_r_mm(&axis, i), axis.r_max_mm),
                          profile[i]);
-    const bool done = !(source->blur_mm > 0) || blur(source, &axis, profile, status);
+    const bool done = blur(source, &axis, profile, status);
     for (int i = 0; done && i < axis.node_count; i++) {
         const double r_mm = fmin(lut_axis_r_mm(&axis, i), axis.r_max_mm);
         for (int b = 0; b < band_count; b++) {

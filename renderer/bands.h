@@ -29,13 +29,13 @@ int render_bands_make(double spacing_mm, double r_max_mm, double ring_spacings,
 /* Part of the profile that the band carries at r_mm, 0 to 1; the bands' weights add to 1. */
 double render_band_weight(const struct render_band *band, double r_mm);
 
-/* Where a medium's profile comes from: a row of a table, and for blur_mm > 0 its average over so wide a
- * Gaussian (footprint.h). */
+/* Where a medium's profile comes from: a row of a table, and where a channel's blur_mm > 0 its average
+ * by footprint.h. */
 struct render_band_source {
     const struct lut_splat *table;
     size_t row;
     const struct render_medium *medium;
-    double blur_mm;
+    double blur_mm[IO_CHANNEL_COUNT];
 };
 
 /* The axis of the bands' own tables: in the logarithm (power 0), with nodes as dense as the weights need.

@@ -166,8 +166,10 @@ static void list_defines(const struct render_plan *plan, const struct render_pas
         if (render_plan_writes(plan, pass->reads_if_written[r]))
             add_define(pass->reads_if_written[r], defines);
     }
-    if (pass->writes_with_ids && plan->has_object_ids)
-        add_define(pass->writes_with_ids, defines);
+    for (size_t i = 0; i < RENDER_PASS_EXTRAS && pass->writes_if_wanted[i]; i++) {
+        if (render_plan_wants(plan, pass->writes_if_wanted[i]))
+            add_define(pass->writes_if_wanted[i], defines);
+    }
 }
 
 static bool program_for(struct render_executor *executor, const struct render_plan *plan,
@@ -290,7 +292,7 @@ static bool prepare_textures(struct render_executor *executor, const struct rend
         executor->textures[i].is_used = executor->textures[i].is_written = false;
     for (size_t i = 0; i < plan->pass_count; i++) {
         const struct render_pass *const pass = plan->passes[i].pass;
-        const char *writes[RENDER_PASS_WRITES + 2];
+        const char *writes[RENDER_PASS_TARGETS + 1];
         render_plan_list_writes(plan, pass, writes);
         for (size_t w = 0; writes[w]; w++) {
             if (!texture_want(executor, plan, writes[w], status))
@@ -353,7 +355,7 @@ struct render_splatter *render_executor_splatter(const struct render_executor *e
     return executor->splatter;
 }
 
-/* Two texels for each object: eta, exit scale per sr, 0, 0; and the diffuse reflectance. */
+/* Two texels for each object: eta, exit scale per sr, r_max in mm, 0; and the diffuse reflectance. */
 bool render_executor_fill_media(const struct render_frame *frame, dipole_status *status)
 {
     const size_t object_count = frame->request->scene->object_count;
@@ -366,6 +368,7 @@ bool render_executor_fill_media(const struct render_frame *frame, dipole_status 
             &frame->plan->media->media[frame->plan->objects[i].medium];
         texels[i][0][0] = (float)medium->eta;
         texels[i][0][1] = (float)(1 / (PI * dipole_fdt_outside(medium->eta)));
+        texels[i][0][2] = (float)frame->plan->of_medium[frame->plan->objects[i].medium].r_max_mm;
         for (int c = 0; c < IO_CHANNEL_COUNT; c++)
             texels[i][1][c] = (float)medium->diffuse_reflectance[c];
     }
@@ -422,9 +425,9 @@ static void far_point(const struct render_plan_view *view, float value[4])
 static bool attach_targets(const struct render_frame *frame, const struct render_pass *pass,
                            GLuint framebuffer, dipole_status *status)
 {
-    GLenum buffers[RENDER_PASS_WRITES + 1];
+    GLenum buffers[RENDER_PASS_TARGETS];
     GLsizei buffer_count = 0;
-    const char *writes[RENDER_PASS_WRITES + 2];
+    const char *writes[RENDER_PASS_TARGETS + 1];
     render_plan_list_writes(frame->plan, pass, writes);
     for (size_t w = 0; writes[w]; w++) {
         struct texture *const target = texture_find(frame->executor, writes[w]);
@@ -469,7 +472,7 @@ static void set_state(const struct render_frame *frame, const struct render_pass
     /* What stands between the light and the object that a map is fitted to is in front of its near plane.
      */
     (is_map ? glEnable : glDisable)(GL_DEPTH_CLAMP);
-    (pass->is_added ? glEnable : glDisable)(GL_BLEND);
+    (pass->is_added || pass->is_blended ? glEnable : glDisable)(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     (pass->depth_written || pass->depth_tested ? glEnable : glDisable)(GL_DEPTH_TEST);
     glDepthMask(pass->depth_written ? GL_TRUE : GL_FALSE);
@@ -520,7 +523,7 @@ static bool draw(const struct render_frame *frame, const struct render_pass *pas
 
 static void make_mipmaps(const struct render_frame *frame, const struct render_pass *pass)
 {
-    const char *writes[RENDER_PASS_WRITES + 2];
+    const char *writes[RENDER_PASS_TARGETS + 1];
     render_plan_list_writes(frame->plan, pass, writes);
     for (size_t w = 0; writes[w]; w++) {
         const struct texture *const target = texture_find(frame->executor, writes[w]);

@@ -6,38 +6,52 @@
 #define PI 3.14159265358979323846
 
 enum {
-    STEPS = 8,         /* nodes and rings to a standard deviation: both sums then err by less than 1e-5 */
-    REACH = 32,        /* of the table, in standard deviations */
-    KERNEL = 6,        /* of the Gaussian                      */
+    STEPS = 8,   /* nodes and rings to a standard deviation: both sums then err by less than 1e-5 */
+    REACH = 32,  /* of the table, in standard deviations; beyond, the blur changes nothing        */
+    KERNEL = 10, /* of the kernel: six standard deviations of its widest Gaussian                 */
+    GAUSSIANS = 3,
     SPECTRUM_STEPS = 6 /* to a factor of two in frequency      */
 };
 
+static const double gaussian_weights[GAUSSIANS] = { 3, -3, 1 }; /* of variances 1, 2, 3 */
+
+/* x: frequency times blur. */
+static double kernel_spectrum(double x)
+{
+    const double e = exp(-0.5 * x * x);
+    return e * (3 + e * (-3 + e));
+}
+
 double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, double blur_mm)
 {
-    const double k_per_mm = 2 * PI / spacing_mm, x = k_per_mm * blur_mm;
-    return 4 * exp(-0.5 * x * x) * dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, k_per_mm) /
+    const double k_per_mm = 2 * PI / spacing_mm;
+    return 4 * kernel_spectrum(k_per_mm * blur_mm) *
+           dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, k_per_mm) /
            dipole_stack_total(stack, DIPOLE_FACE_LIT);
 }
 
 double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double epsilon)
 {
     const double aliasing = render_footprint_aliasing(stack, spacing_mm, 0);
-    return aliasing > epsilon ? spacing_mm / (2 * PI) * sqrt(2 * log(aliasing / epsilon)) : 0;
+    if (!(aliasing > epsilon))
+        return 0;
+    const double part = cbrt(1 - epsilon / aliasing); /* 1 - e^(-x^2/2) */
+    return spacing_mm / (2 * PI) * sqrt(-2 * log1p(-part));
 }
 
 /*
  * The response to an edge at 0 is 1/2 + (1/pi) int spectrum(k) sin(kx)/k dk, and so differs by at most
  * (1/pi) int spectrum(k) (1 - blur(k))/k dk: the trapezoidal rule in log k, over which the integrand rises
- * as k^2 and falls with the spectrum.
+ * as k^6 and falls with the spectrum.
  */
 double render_footprint_error(const dipole_stack *stack, double blur_mm)
 {
     const double step = log(2) / SPECTRUM_STEPS;
     double sum = 0;
-    for (int i = -10 * SPECTRUM_STEPS; i <= 20 * SPECTRUM_STEPS; i++) {
+    for (int i = -4 * SPECTRUM_STEPS; i <= 20 * SPECTRUM_STEPS; i++) {
         const double x = exp(i * step);
-        const double term =
-            -expm1(-0.5 * x * x) * dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, x / blur_mm);
+        const double lost = -expm1(-0.5 * x * x);
+        const double term = lost * lost * lost * dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, x / blur_mm);
         sum += term;
         if (i > 0 && term < 1e-6 * sum)
             break;
@@ -89,10 +103,16 @@ static double scaled_bessel_i0(double x)
     return sum / sqrt(x);
 }
 
-/* Mean of the Gaussian of standard deviation 1 over a ring of radius s about a point at r. */
-static double gaussian_over_ring(double r, double s)
+/* Mean of the kernel of blur 1 over a ring of radius s about a point at r. */
+static double kernel_over_ring(double r, double s)
 {
-    return exp(-0.5 * (r - s) * (r - s)) * scaled_bessel_i0(r * s) / (2 * PI);
+    double sum = 0;
+    for (int i = 0; i < GAUSSIANS; i++) {
+        const double variance = i + 1;
+        sum += gaussian_weights[i] * exp(-0.5 * (r - s) * (r - s) / variance) *
+               scaled_bessel_i0(r * s / variance) / (2 * PI * variance);
+    }
+    return sum;
 }
 
 bool render_footprint_create(const dipole_stack *stack, double blur_mm,
@@ -123,7 +143,7 @@ bool render_footprint_create(const dipole_stack *stack, double blur_mm,
         const int last = node + KERNEL * STEPS < ring_count ? node + KERNEL * STEPS : ring_count - 1;
         double sum = 0;
         for (int i = first; i <= last; i++)
-            sum += power[i] * gaussian_over_ring((double)node / STEPS, (double)i / STEPS);
+            sum += power[i] * kernel_over_ring((double)node / STEPS, (double)i / STEPS);
         footprint->values_per_mm2[node] = sum / (blur_mm * blur_mm);
     }
     free(power);

@@ -1,5 +1,9 @@
-/* The profile averaged over the patch that a light sample stands for, so that samples farther apart than
- * the profile is wide do not show as dots. theory.md T34. */
+/*
+ * The profile averaged over the patch that a light sample stands for, so that samples farther apart than
+ * the profile is wide do not show as dots. The average is by 3 G(b) - 3 G(b sqrt 2) + G(b sqrt 3), G(b) a
+ * Gaussian of standard deviation b = blur_mm: its spectrum 1 - (1 - e^(-(bk)^2/2))^3 leaves coarse features
+ * alone and ends as fast as a Gaussian's. theory.md T34.
+ */
 #ifndef RENDERER_FOOTPRINT_H
 #define RENDERER_FOOTPRINT_H
 
@@ -8,7 +12,7 @@
 /* Aliasing of samples spacing_mm apart once the profile is blurred: at most, as part of the total. */
 double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, double blur_mm);
 
-/* Standard deviation of the Gaussian that keeps aliasing at epsilon; 0 where it is less without. */
+/* The blur that keeps aliasing at epsilon; 0 where it is less without. */
 double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double epsilon);
 
 /* What the blur changes at the edge of a shadow on a flat surface, at most, as part of the lit radiosity.

@@ -120,13 +120,17 @@ static bool append(struct render_light_samples *samples, const struct render_lig
 static bool append_block(const struct reducer *reducer, struct block block, double extent_mm)
 {
     const struct render_light_view *const view = reducer->view;
-    double share = 0, moment[3] = { 0, 0, 0 };
+    double share = 0, irradiance = 0, moment[3] = { 0, 0, 0 };
+    int lit_count = 0;
     for (int y = block.y; y < block.y + block.height; y++) {
         for (int x = block.x; x < block.x + block.width; x++) {
             const float *const t = lit_texel(reducer, x, y);
             if (!t)
                 continue;
             share += (double)t[3];
+            lit_count++;
+            if (view->irradiance)
+                irradiance += (double)view->irradiance[(size_t)y * (size_t)view->size_px + (size_t)x];
             for (int k = 0; k < 3; k++)
                 moment[k] += (double)t[3] * (double)t[k];
         }
@@ -137,7 +141,7 @@ static bool append_block(const struct reducer *reducer, struct block block, doub
                                           .object = (float)reducer->object };
     for (int k = 0; k < 3; k++) {
         sample.position_mm[k] = (float)(moment[k] / share);
-        sample.flux_w[k] = (float)(share * view->rgb[k]);
+        sample.flux_w[k] = (float)((view->irradiance ? irradiance / lit_count : share) * view->rgb[k]);
     }
     return append(reducer->targets[reducer->object].samples, &sample, reducer->status);
 }

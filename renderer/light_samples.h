@@ -25,6 +25,8 @@ struct render_light_samples {
 struct render_light_view {
     const float *texels;
     const float *objects; /* of each texel: object + 1; NULL: all are object 0 */
+    const float
+        *irradiance; /* of each texel, per rgb; NULL, or in place of its flux samples get their mean */
     int size_px;
     double forward[3]; /* unit vector, the view's depth axis */
     double rgb[3];

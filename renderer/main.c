@@ -9,6 +9,7 @@
 
 #include <jansson.h>
 #include <limits.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +18,7 @@ struct options {
     struct cli_texts allowed_paths;
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
-    int technique, context;
+    int technique, context, area;
     int tsm_gather, tsm_response, tsm_part, layer_pairs;
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
@@ -44,15 +45,22 @@ static const char *const layer_count_names[] = { "0", "2", "4", "6", "8", "10", 
 
 /* ---- results ------------------------------------------------------------------------------------ */
 
+/* null where nothing bounds the error. */
+static json_t *create_error(double error)
+{
+    return isfinite(error) ? json_real(error) : json_null();
+}
+
 /* NULL: no memory, or a path that is not UTF-8. */
 static json_t *create_result(const struct render_report *report, const char *path)
 {
     json_t *const effects = json_array();
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f}", "name", effect->name, "active",
-                                                 effect->is_active, "reason", effect->reason, "ms",
-                                                 effect->time_ms));
+        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f, s:f, s:o}", "name", effect->name,
+                                                 "active", effect->is_active, "reason", effect->reason,
+                                                 "predicted_ms", effect->predicted_ms, "ms",
+                                                 effect->time_ms, "error", create_error(effect->error)));
     }
     return json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique", render_technique_names[report->technique],
                      "epsilon", report->epsilon, "effects", effects, "total_ms", report->total_ms, "image",
@@ -92,11 +100,15 @@ static void print_plan(const struct render_report *report)
         printf("%12s  estimated error\n", "samples");
     for (size_t i = 0; i < report->doubling_count; i++)
         printf("%12zu  %.3g\n", report->doublings[i].sample_count, report->doublings[i].error);
-    printf("%-16s  %-6s  %9s  reason\n%-16s  %-6s  %9s\n", "effect", "active", "time", "", "", "ms");
+    printf("%-16s  %-6s  %9s  %9s  %8s  reason\n%-16s  %-6s  %9s  %9s\n", "effect", "active", "predicted",
+           "time", "error", "", "", "ms", "ms");
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        printf("%-16s  %-6s  %9.1f  %s\n", effect->name, effect->is_active ? "yes" : "no", effect->time_ms,
-               effect->reason);
+        char error[16] = "unbound.";
+        if (isfinite(effect->error))
+            snprintf(error, sizeof error, "%.2g", effect->error);
+        printf("%-16s  %-6s  %9.1f  %9.1f  %8s  %s\n", effect->name, effect->is_active ? "yes" : "no",
+               effect->predicted_ms, effect->time_ms, error, effect->reason);
     }
 }
 
@@ -267,6 +279,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     struct job job = { .tool = tool,
                        .options = options,
                        .drawing = { .technique = (enum render_technique)options->technique,
+                                    .area = (enum render_area)options->area,
                                     .epsilon = options->epsilon,
                                     .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
                                              .response = (enum render_tsm_response)options->tsm_response,
@@ -310,6 +323,14 @@ int main(int argc, char **argv)
                   "on the "
                   "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
+        { .name = "splat-area",
+          .kind = CLI_CHOICE,
+          .target = &options.area,
+          .argument = "NAME",
+          .help =
+              "Area that a light sample stands for: flux, which needs none, or overlap, counted as in the "
+              "paper, for comparison. Default flux.",
+          .choices = render_area_names },
         { .name = "tsm",
           .kind = CLI_CHOICE,
           .target = &options.tsm_gather,

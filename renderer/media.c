@@ -20,6 +20,27 @@ static bool medium_init(struct render_medium *medium, const struct io_material *
     return true;
 }
 
+static double surface_area_mm2(const struct io_mesh *mesh)
+{
+    double sum = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        const uint32_t *const corners = &mesh->indices[3 * t];
+        double sides[2][3], normal[3], square = 0;
+        for (int side = 0; side < 2; side++) {
+            for (size_t k = 0; k < 3; k++)
+                sides[side][k] = (double)mesh->positions[3 * (size_t)corners[side + 1] + k] -
+                                 (double)mesh->positions[3 * (size_t)corners[0] + k];
+        }
+        for (int k = 0; k < 3; k++) {
+            normal[k] = sides[0][(k + 1) % 3] * sides[1][(k + 2) % 3] -
+                        sides[0][(k + 2) % 3] * sides[1][(k + 1) % 3];
+            square += normal[k] * normal[k];
+        }
+        sum += 0.5 * sqrt(square);
+    }
+    return sum;
+}
+
 /* Index of the medium of that hash; count when there is none yet. */
 static size_t find(const struct render_media *media, const struct lut_hash *hash)
 {
@@ -37,14 +58,17 @@ bool render_media_create(const struct io_scene *scene, struct render_media **med
     struct render_media *const media = calloc(1, sizeof *media);
     if (media) {
         media->media = calloc(scene->object_count, sizeof *media->media);
+        media->object_count = scene->object_count;
+        media->area_mm2 = calloc(scene->object_count, sizeof *media->area_mm2);
         media->of_object = calloc(scene->object_count, sizeof *media->of_object);
     }
-    bool done = media && media->media && media->of_object;
+    bool done = media && media->media && media->of_object && media->area_mm2;
     if (!done)
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the media of %zu objects",
                     scene->object_count);
     for (size_t i = 0; done && i < scene->object_count; i++) {
         const struct io_material *const material = &scene->objects[i].material;
+        media->area_mm2[i] = surface_area_mm2(scene->objects[i].mesh);
         const struct lut_hash hash = lut_material_hash(material);
         media->of_object[i] = find(media, &hash);
         if (media->of_object[i] < media->count)
@@ -70,6 +94,7 @@ void render_media_destroy(struct render_media *media)
     }
     free(media->media);
     free(media->of_object);
+    free(media->area_mm2);
     free(media);
 }
 

@@ -20,6 +20,8 @@ struct render_medium {
 struct render_media {
     struct render_medium *media;
     size_t count;
+    size_t object_count;
+    double *area_mm2;    /* of each object's surface                                      */
     size_t *of_object;   /* index into media, for each object of the scene */
     bool has_scattering; /* some medium has */
 };

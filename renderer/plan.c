@@ -12,6 +12,7 @@
 enum { LIGHT_LIMIT = 1024 };
 
 const char *const render_technique_names[] = { "auto", "splat", "lambert", "reference", "tsm", NULL };
+const char *const render_area_names[] = { "flux", "overlap", NULL };
 
 static struct render_decision decision(bool is_active, const char *format, va_list arguments)
     __attribute__((format(printf, 2, 0)));
@@ -147,23 +148,52 @@ static bool take_media(const struct render_request *request, struct render_plan 
                        scene->object_count);
 }
 
-static void look_at_objects(const struct io_scene *scene, struct render_plan *plan)
+/* Of the disc in the ball's rectangle. */
+static double pixels_of_ball(const struct render_plan *plan, const double rectangle[4])
 {
+    const double width = fmin(rectangle[2], 1) - fmax(rectangle[0], -1);
+    const double height = fmin(rectangle[3], 1) - fmax(rectangle[1], -1);
+    const double share = fmax(width, 0) * fmax(height, 0) / 4;
+    return PI / 4 * share * plan->width_px * plan->height_px;
+}
+
+/* Of a surface of that area: a convex one shows a quarter of it, on average over all sides. */
+static double pixels_of_area(const struct render_plan *plan, const struct render_ball *ball,
+                             double area_mm2)
+{
+    double in_view_mm[3];
+    render_projection_to_view(&plan->camera, ball->centre_mm, in_view_mm);
+    const double pixel_mm = plan->camera.is_orthographic
+                                ? plan->pixel_mm
+                                : plan->pixel_mm * fmax(in_view_mm[2], ball->radius_mm);
+    return 0.25 * area_mm2 / (pixel_mm * pixel_mm);
+}
+
+/* A capture keeps the light of objects out of sight, too. */
+static void look_at_objects(const struct render_request *request, struct render_plan *plan)
+{
+    const struct io_scene *const scene = request->scene;
     for (size_t i = 0; i < scene->object_count; i++) {
         struct render_plan_object *const object = &plan->objects[i];
-        double rectangle[4];
+        double rectangle[4] = { 0, 0, 0, 0 };
         object->medium = plan->media->of_object[i];
         object->ball = scene->object_count == 1 ? plan->ball : render_ball_of_mesh(scene->objects[i].mesh);
-        object->is_visible = render_projection_bound_sphere(&plan->camera, object->ball.centre_mm,
-                                                            object->ball.radius_mm, rectangle);
+        object->is_visible =
+            request->is_captured || render_projection_bound_sphere(&plan->camera, object->ball.centre_mm,
+                                                                   object->ball.radius_mm, rectangle);
+        plan->triangle_count += scene->objects[i].mesh->triangle_count;
         if (!object->is_visible)
             continue;
+        object->pixel_count = fmin(pixels_of_ball(plan, rectangle),
+                                   pixels_of_area(plan, &object->ball, plan->media->area_mm2[i]));
+        plan->covered_px += object->pixel_count;
         struct render_plan_medium *const medium = &plan->of_medium[object->medium];
         medium->is_visible = true;
         medium->diameter_mm = fmax(medium->diameter_mm, 2 * object->ball.radius_mm);
         plan->has_scattering |= plan->media->media[object->medium].has_scattering;
         plan->has_specular |= scene->objects[i].has_specular;
     }
+    plan->covered_px = fmin(plan->covered_px, (double)plan->width_px * plan->height_px);
 }
 
 static bool read_scene(const struct render_request *request, struct render_plan *plan,
@@ -180,7 +210,7 @@ static bool read_scene(const struct render_request *request, struct render_plan 
     plan->pixel_mm = 2 * plan->camera.half_height / plan->height_px;
     for (size_t i = 0; i < scene->light_count; i++)
         plan->lit_count += render_light_shines(&scene->lights[i]);
-    look_at_objects(scene, plan);
+    look_at_objects(request, plan);
     return true;
 }
 
@@ -217,11 +247,17 @@ static void tell_objects_apart(const struct io_scene *scene, struct render_plan 
 static void choose_technique(const struct render_request *request, struct render_plan *plan)
 {
     plan->technique = request->technique;
+    plan->area = request->is_captured ? RENDER_AREA_FLUX : request->area;
     if (request->is_captured)
         plan->technique = RENDER_TECHNIQUE_SPLAT;
     else if (plan->technique == RENDER_TECHNIQUE_AUTO)
         plan->technique =
             plan->has_scattering && plan->r_max_px < 1 ? RENDER_TECHNIQUE_LAMBERT : RENDER_TECHNIQUE_SPLAT;
+    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+        plan->area = RENDER_AREA_FLUX;
+    if (request->scene->has_environment)
+        render_plan_add_note(plan, "the environment \"%.120s\" is not drawn: no technique knows it yet",
+                             request->scene->environment.path);
 }
 
 /* ---- the plan ----------------------------------------------------------------------------------- */
@@ -229,7 +265,12 @@ static void choose_technique(const struct render_request *request, struct render
 static void decide(const struct render_request *request, struct render_plan *plan)
 {
     for (size_t e = 0; render_effects[e]; e++) {
-        plan->decisions[e] = render_effects[e]->decide(request, plan);
+        struct render_decision *const decision = &plan->decisions[e];
+        *decision = render_effects[e]->decide(request, plan);
+        if (decision->is_active && render_effects[e]->cost_ms)
+            decision->cost_ms = render_effects[e]->cost_ms(plan);
+        if (decision->is_active && render_effects[e]->error)
+            decision->error = render_effects[e]->error(plan);
         plan->effect_count++;
     }
 }

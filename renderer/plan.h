@@ -21,6 +21,7 @@ struct render_request {
     double epsilon;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
+    enum render_area area;
     bool is_captured; /* no scattering; what it would need is kept instead */
     bool is_tone_mapped;
 };
@@ -32,7 +33,7 @@ enum render_draw_kind {
     RENDER_DRAW_NOTHING,    /* the pass's run function needs no targets        */
 };
 
-enum { RENDER_PASS_READS = 8, RENDER_PASS_WRITES = 4 };
+enum { RENDER_PASS_READS = 8, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 2, RENDER_PASS_TARGETS = 6 };
 
 /* One row of an effect. Names of textures are those of the table in plan.c. */
 struct render_pass {
@@ -41,19 +42,22 @@ struct render_pass {
     bool is_per_view; /* once for each of the lights' views        */
     bool is_per_map;  /* once for each translucent shadow map      */
     bool is_added;    /* to what the target holds, else replaces it */
+    bool is_blended;  /* draws add up, on a target that was cleared         */
     const char *reads[RENDER_PASS_READS];
     const char *reads_if_written[RENDER_PASS_READS]; /* shader sees HAS_<NAME>        */
     const char *writes[RENDER_PASS_WRITES];
-    const char *writes_with_ids; /* behind them, where the plan tells objects apart: HAS_<NAME> */
-    const char *depth_written;   /* depth texture, tested and written         */
-    const char *depth_tested;    /* depth texture, tested only                */
-    void (*bind)(const struct render_frame *frame);                       /* sets uniforms  */
+    const char *writes_if_wanted[RENDER_PASS_EXTRAS]; /* behind them, if render_plan_wants: HAS_<NAME> */
+    const char *depth_written;                        /* depth texture, tested and written         */
+    const char *depth_tested;                         /* depth texture, tested only                */
+    void (*bind)(const struct render_frame *frame);   /* sets uniforms  */
     bool (*run)(const struct render_frame *frame, dipole_status *status); /* BY_RUN and NOTHING */
 };
 
 struct render_decision {
     bool is_active;
     char reason[160];
+    double cost_ms; /* predicted, 0 unless active         */
+    double error;   /* that it leaves, relative radiosity */
 };
 
 struct render_plan;
@@ -61,6 +65,8 @@ struct render_plan;
 struct render_effect {
     const char *name, *source; /* source: publication, or what it is */
     struct render_decision (*decide)(const struct render_request *request, const struct render_plan *plan);
+    double (*cost_ms)(const struct render_plan *plan); /* when it is active (cost.h)  */
+    double (*error)(const struct render_plan *plan);   /* NULL: it leaves none        */
     const struct render_pass *passes;
     size_t pass_count;
 };
@@ -113,17 +119,18 @@ struct render_plan_pass {
 struct render_plan_object {
     size_t medium;
     struct render_ball ball;
-    bool is_visible;   /* some of it may be in the picture; what is not is no more than a blocker */
-    double spacing_mm; /* of its finest light samples                                            */
+    bool is_visible;    /* some of it may be in the picture; what is not is no more than a blocker */
+    double pixel_count; /* that it may cover, as a ball would                                     */
+    double spacing_mm;  /* of its finest light samples                                            */
 };
 
 /* What becomes of the visible objects of one medium. All 0 where there are none. */
 struct render_plan_medium {
     bool is_visible;
-    double diameter_mm; /* of the largest object                            */
-    double r_max_mm;    /* splats reach as far                              */
-    double spacing_mm;  /* asked of the finest light samples                */
-    double blur_mm;     /* of the profile, so that they do not show; 0: none is needed (footprint.h) */
+    double diameter_mm;               /* of the largest object                            */
+    double r_max_mm;                  /* splats reach as far                              */
+    double spacing_mm;                /* asked of the finest light samples                */
+    double blur_mm[IO_CHANNEL_COUNT]; /* of the profile, so that they do not show; 0: none is needed */
     struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
     int band_count;
     double inner_mm; /* of the pattern of samples of translucent shadow maps     */
@@ -133,6 +140,7 @@ struct render_plan_medium {
 /* Owns its lists; end it with render_plan_destroy. */
 struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
+    enum render_area area;
     double epsilon;
     const struct render_media *media;
     struct render_media *own_media; /* when the request brought none                    */
@@ -143,6 +151,8 @@ struct render_plan {
     bool has_object_ids;    /* objects are told apart: they differ, or are near each other */
     const char *ids_reason; /* why, or why not                                             */
     size_t lit_count;       /* lights that are not black                        */
+    size_t triangle_count;
+    double covered_px; /* pixels that objects may cover, at most all       */
 
     /* The error budget: shares of epsilon, then what they lead to, of the worst medium. */
     double truncation_epsilon, aliasing_epsilon, banding_epsilon, table_epsilon;
@@ -165,6 +175,7 @@ struct render_plan {
     size_t view_count;
     struct render_plan_view *maps; /* translucent shadow maps: of each light and visible object */
     size_t map_count;
+    struct render_tsm_options tsm;
     size_t vertex_count; /* of the scene, when the maps are gathered at vertices */
     struct render_plan_pass *passes;
     size_t pass_count;
@@ -202,7 +213,10 @@ DIPOLE_CHECKED bool render_plan_add_passes(struct render_plan *plan,
 
 /* The textures that a pass writes under this plan, ending with NULL; depth aside. */
 void render_plan_list_writes(const struct render_plan *plan, const struct render_pass *pass,
-                             const char *writes[RENDER_PASS_WRITES + 2]);
+                             const char *writes[RENDER_PASS_TARGETS + 1]);
+
+/* Whether the scene calls for a texture that a pass can write beside its others. */
+bool render_plan_wants(const struct render_plan *plan, const char *texture);
 
 /* The texels of the largest map; 0 when there is none. */
 int render_plan_map_side_px(const struct render_plan *plan);

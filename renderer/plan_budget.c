@@ -16,7 +16,7 @@
 
 /* A profile too narrow to be sampled within ALIASING_SHARE is blurred, and half of it each is spent on
  * aliasing and blur, if samples may then be so many times farther apart. */
-#define BLUR_GAIN 1.5
+#define BLUR_GAIN 2
 
 /* Rings of so many spacings keep the bands' error under their share of epsilon = 0.01; for a tenth of that,
  * so many more are needed (bands.h). */
@@ -43,12 +43,6 @@ static double tail(const dipole_stack *stack, double r_mm, double unused)
 {
     (void)unused;
     return dipole_stack_beyond(stack, DIPOLE_FACE_LIT, r_mm) / dipole_stack_total(stack, DIPOLE_FACE_LIT);
-}
-
-static double blur_error(const dipole_stack *stack, double blur_mm, double unused)
-{
-    (void)unused;
-    return render_footprint_error(stack, blur_mm);
 }
 
 /* The narrowest channel's. */
@@ -137,6 +131,24 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     plan->r_max_px = plan->r_max_mm / (plan->pixel_mm * nearest_mm);
 }
 
+/* Of each channel that would alias by more than its share. */
+static void blur_channels(const struct render_plan *plan, const struct render_medium *medium,
+                          double spacing_mm, struct render_plan_medium *planned)
+{
+    planned->aliasing_error = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const dipole_stack *const stack = medium->stacks[c];
+        if (!(medium->diffuse_reflectance[c] > 0))
+            continue;
+        planned->blur_mm[c] = render_footprint_blur_mm(stack, spacing_mm, 0.5 * plan->aliasing_epsilon);
+        planned->aliasing_error = fmax(planned->aliasing_error,
+                                       render_footprint_aliasing(stack, spacing_mm, planned->blur_mm[c]));
+        if (planned->blur_mm[c] > 0)
+            planned->blur_error =
+                fmax(planned->blur_error, render_footprint_error(stack, planned->blur_mm[c]));
+    }
+}
+
 static void settle_medium(const struct render_request *request, struct render_plan *plan, size_t index,
                           double texel_mm)
 {
@@ -147,27 +159,27 @@ static void settle_medium(const struct render_request *request, struct render_pl
         return;
     const double decades = log10(RING_EPSILON / plan->epsilon);
     const double ring_spacings = RING_SPACINGS + RING_SPACINGS_PER_DECADE * fmax(decades, 0);
-    /* What is captured is summed by others, from the finest samples alone. */
-    const double reach_mm = request->is_captured ? 0 : planned->r_max_mm;
-    planned->band_count = render_bands_make(wanted_mm, reach_mm, ring_spacings, planned->bands);
+    /* What is captured is summed by others, from the finest samples alone; so are samples that are counted.
+     */
+    const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
+    const double reach_mm = planned->r_max_mm;
+    planned->band_count =
+        render_bands_make(wanted_mm, reach_mm, is_single ? INFINITY : ring_spacings, planned->bands);
     plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
     if (request->is_captured)
         return;
     const double spacing_mm = fmax(wanted_mm, texel_mm);
     planned->aliasing_error = worst(medium, render_footprint_aliasing, spacing_mm, 0);
-    if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6)) {
-        planned->blur_mm =
-            worst(medium, render_footprint_blur_mm, spacing_mm, 0.5 * plan->aliasing_epsilon);
-        planned->aliasing_error = worst(medium, render_footprint_aliasing, spacing_mm, planned->blur_mm);
-        planned->blur_error = worst(medium, blur_error, planned->blur_mm, 0);
-    }
+    if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))
+        blur_channels(plan, medium, spacing_mm, planned);
+    const double widest_blur_mm = fmax(fmax(planned->blur_mm[0], planned->blur_mm[1]), planned->blur_mm[2]);
     if (spacing_mm > wanted_mm * (1 + 1e-6))
         render_plan_add_note(
             plan,
             "light samples of material \"%.60s\" are %.3g mm apart, %.3g mm were asked: a "
             "light's view is limited to %d texels a side; edges of shadows blur by %.2g mm, "
             "which changes them by up to %.2g",
-            medium->material->name, spacing_mm, wanted_mm, RENDER_VIEW_SIDE_LIMIT, planned->blur_mm,
+            medium->material->name, spacing_mm, wanted_mm, RENDER_VIEW_SIDE_LIMIT, widest_blur_mm,
             planned->blur_error);
 }
 

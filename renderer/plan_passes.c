@@ -17,7 +17,8 @@ static const struct render_texture textures[] = {
     { .name = "position_depth", .format = RENDER_DEPTH32F }, /* 0 where no object is                */
     { .name = "object_media", .format = RENDER_OTHER },      /* what each object is made of              */
     { .name = "light_view", .size = RENDER_SIZE_LIGHT_VIEW, .is_far_where_empty = true },
-    { .name = "light_object", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW }, /* object + 1  */
+    { .name = "light_object", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW },     /* object + 1  */
+    { .name = "light_irradiance", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW }, /* per rgb */
     { .name = "light_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_LIGHT_VIEW },
     { .name = "light_samples", .format = RENDER_OTHER },
     { .name = "tsm_volume", .format = RENDER_OTHER },  /* of the map's medium                        */
@@ -34,11 +35,12 @@ static const struct render_texture textures[] = {
     { .name = "tsm_vertices", .format = RENDER_OTHER },                        /* as position_mm    */
     { .name = "tsm_vertex_radiosity", .size = RENDER_SIZE_VERTICES },
     { .name = "tsm_surface_radiosity", .is_multisampled = true }, /* w = object + 1                  */
-    { .name = "radiosity" }, /* W/mm^2                                                              */
-    { .name = "specular" },  /* radiance, already averaged over the pixel                           */
-    { .name = "radiance" },  /* premultiplied by a = coverage                                       */
-    { .name = "capture" },   /* exit per sr, coverage, part of it that shows the pixel's own surface */
-    { .name = "display" },   /* tone mapped, 0..1, linear                                           */
+    { .name = "overlap_sum" }, /* irradiance times R_d, summed; a = how many samples                 */
+    { .name = "radiosity" },   /* W/mm^2                                                              */
+    { .name = "specular" },    /* radiance, already averaged over the pixel                           */
+    { .name = "radiance" },    /* premultiplied by a = coverage                                       */
+    { .name = "capture" },     /* exit per sr, coverage, part of it that shows the pixel's own surface */
+    { .name = "display" },     /* tone mapped, 0..1, linear                                           */
 };
 
 const struct render_texture *render_texture_find(const char *name)
@@ -65,22 +67,32 @@ static size_t list_passes(const struct render_plan *plan, const struct render_ef
     return count;
 }
 
+bool render_plan_wants(const struct render_plan *plan, const char *texture)
+{
+    if (strcmp(texture, "light_object") == 0)
+        return plan->has_object_ids;
+    assert(strcmp(texture, "light_irradiance") == 0);
+    return plan->area == RENDER_AREA_OVERLAP;
+}
+
 void render_plan_list_writes(const struct render_plan *plan, const struct render_pass *pass,
-                             const char *writes[RENDER_PASS_WRITES + 2])
+                             const char *writes[RENDER_PASS_TARGETS + 1])
 {
     size_t count = 0;
     while (count < RENDER_PASS_WRITES && pass->writes[count]) {
         writes[count] = pass->writes[count];
         count++;
     }
-    if (pass->writes_with_ids && plan->has_object_ids)
-        writes[count++] = pass->writes_with_ids;
+    for (size_t i = 0; i < RENDER_PASS_EXTRAS && pass->writes_if_wanted[i]; i++) {
+        if (render_plan_wants(plan, pass->writes_if_wanted[i]))
+            writes[count++] = pass->writes_if_wanted[i];
+    }
     writes[count] = NULL;
 }
 
 static bool writes(const struct render_plan *plan, const struct render_pass *pass, const char *texture)
 {
-    const char *list[RENDER_PASS_WRITES + 2];
+    const char *list[RENDER_PASS_TARGETS + 1];
     render_plan_list_writes(plan, pass, list);
     for (size_t w = 0; list[w]; w++) {
         if (strcmp(list[w], texture) == 0)

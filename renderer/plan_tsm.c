@@ -179,6 +179,7 @@ bool render_plan_make_maps(const struct render_request *request, struct render_p
         return true;
     if (!check_options(request, plan, status))
         return false;
+    plan->tsm = request->tsm;
     find_patterns(request, plan);
     if (request->tsm.gather == RENDER_TSM_VERTEX)
         for (size_t i = 0; i < scene->object_count; i++)

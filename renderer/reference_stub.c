@@ -3,6 +3,9 @@ bool render_reference_draw(const struct io_scene *scene, const struct render_opt
                            struct io_image **image_out, struct render_report *report_out,
                            dipole_status *status)
 {
-    (void)scene; (void)options; (void)report_out; *image_out = NULL;
+    (void)scene;
+    (void)options;
+    (void)report_out;
+    *image_out = NULL;
     return dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL, "not yet");
 }

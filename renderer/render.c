@@ -143,6 +143,8 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
     for (size_t e = 0; e < plan->effect_count; e++) {
         report->effects[e].name = render_effects[e]->name;
         report->effects[e].is_active = plan->decisions[e].is_active;
+        report->effects[e].predicted_ms = plan->decisions[e].cost_ms;
+        report->effects[e].error = plan->decisions[e].error;
         report->effects[e].time_ms = time_ms[e];
         memcpy(report->effects[e].reason, plan->decisions[e].reason, sizeof report->effects[e].reason);
     }
@@ -187,6 +189,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
     const struct render_request request = {
         .scene = renderer->scene,
         .technique = options->technique,
+        .area = options->area,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
         .media = renderer->media,
         .tables = options->tables,

@@ -28,6 +28,11 @@ enum render_technique {
 /* "auto", "splat", "lambert", "reference", "tsm", NULL */
 extern const char *const render_technique_names[];
 
+/* How a splat knows the area that its sample stands for: by the flux of its texels, which needs no area; or
+ * as in the paper, its disc of r_max over the number of samples that overlap a pixel, for comparison. */
+enum render_area { RENDER_AREA_FLUX = 0, RENDER_AREA_OVERLAP };
+extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
+
 /* epsilon: asked relative error of the radiosity. */
 #define RENDER_EPSILON_DEFAULT 0.01
 #define RENDER_EPSILON_MIN 1e-5
@@ -90,7 +95,8 @@ enum { RENDER_TSM_LAYER_LIMIT = 16 };
 
 struct render_options {
     enum render_technique technique;
-    double epsilon;                       /* 0: RENDER_EPSILON_DEFAULT                              */
+    double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
+    enum render_area area;
     const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
     struct render_tsm_options tsm;
@@ -115,7 +121,8 @@ struct render_effect_report {
     const char *name;
     bool is_active;
     char reason[160];
-    double time_ms;
+    double predicted_ms, time_ms;
+    double error; /* predicted, that it leaves */
 };
 
 /* What was done, why, and how long it took. */

@@ -17,7 +17,7 @@ struct medium_samples {
 struct table_key {
     const struct lut_splat *table;
     size_t row;
-    double blur_mm;
+    double blur_mm[IO_CHANNEL_COUNT];
     int band_count;
     struct render_band bands[RENDER_BAND_LIMIT];
 };
@@ -26,7 +26,7 @@ struct render_splatter {
     size_t medium_count;
     struct medium_samples *of_medium;
     struct table_key *keys; /* of what table_buffer holds, medium by medium */
-    size_t splat_count;
+    size_t splat_count, dropped_count;
     GLuint vertex_array, splat_buffer;
     struct render_buffer_texture sample_buffer, table_buffer;
 };
@@ -87,13 +87,24 @@ void render_splatter_destroy(struct render_splatter *splatter)
     free(splatter);
 }
 
-void render_splatter_begin(struct render_splatter *splatter)
+static void empty_samples(struct render_splatter *splatter)
 {
-    splatter->splat_count = 0;
     for (size_t m = 0; m < splatter->medium_count; m++) {
         for (int b = 0; b < RENDER_BAND_LIMIT; b++)
             splatter->of_medium[m].bands[b].count = 0;
     }
+}
+
+void render_splatter_begin(struct render_splatter *splatter)
+{
+    splatter->splat_count = splatter->dropped_count = 0;
+    empty_samples(splatter);
+}
+
+void render_splatter_drop_samples(struct render_splatter *splatter)
+{
+    splatter->dropped_count = render_splatter_sample_count(splatter);
+    empty_samples(splatter);
 }
 
 /* ---- samples ------------------------------------------------------------------------------------ */
@@ -120,11 +131,15 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     struct render_light_target *const targets = calloc(object_count, sizeof *targets);
     float *const texels = read_view(frame, "light_view", GL_RGBA, 4);
     float *const objects = plan->has_object_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
-    bool done = targets && texels && (objects || !plan->has_object_ids);
+    const bool is_counted = plan->area == RENDER_AREA_OVERLAP;
+    float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
+    bool done = targets && texels && (objects || !plan->has_object_ids) && (irradiance || !is_counted);
     if (done) {
-        struct render_light_view reduced = {
-            .texels = texels, .objects = objects, .size_px = view->size_px, .levels = view->levels
-        };
+        struct render_light_view reduced = { .texels = texels,
+                                             .objects = objects,
+                                             .irradiance = irradiance,
+                                             .size_px = view->size_px,
+                                             .levels = view->levels };
         memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
         memcpy(reduced.rgb, frame->request->scene->lights[view->light].rgb, sizeof reduced.rgb);
         for (size_t i = 0; i < object_count; i++) {
@@ -147,6 +162,7 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     free(targets);
     free(texels);
     free(objects);
+    free(irradiance);
     return done;
 }
 
@@ -155,8 +171,8 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
 static bool is_table_of(const struct table_key *key, const struct render_table *table,
                         const struct render_plan_medium *planned)
 {
-    return key->table == table->lut && key->row == table->row && key->blur_mm == planned->blur_mm &&
-           key->band_count == planned->band_count &&
+    return key->table == table->lut && key->row == table->row && key->band_count == planned->band_count &&
+           memcmp(key->blur_mm, planned->blur_mm, sizeof key->blur_mm) == 0 &&
            memcmp(key->bands, planned->bands, sizeof key->bands) == 0;
 }
 
@@ -183,10 +199,10 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     bool done = true;
     for (size_t m = 0; done && m < splatter->medium_count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
-        const struct render_band_source source = { .table = tables[m].lut,
-                                                   .row = tables[m].row,
-                                                   .medium = &plan->media->media[m],
-                                                   .blur_mm = planned->blur_mm };
+        struct render_band_source source = { .table = tables[m].lut,
+                                             .row = tables[m].row,
+                                             .medium = &plan->media->media[m] };
+        memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
         if (planned->band_count == 0)
             continue;
         done = render_bands_bake(&source, planned->bands, planned->band_count, next, status);
@@ -200,8 +216,8 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
         struct table_key *const key = &splatter->keys[m];
         *key = (struct table_key){ .table = tables[m].lut,
                                    .row = tables[m].row,
-                                   .blur_mm = planned->blur_mm,
                                    .band_count = planned->band_count };
+        memcpy(key->blur_mm, planned->blur_mm, sizeof key->blur_mm);
         memcpy(key->bands, planned->bands, sizeof key->bands);
     }
     free(nodes);
@@ -294,15 +310,16 @@ static void draw_batch(struct render_splatter *splatter, const struct render_fra
 }
 
 bool render_splatter_draw(struct render_splatter *splatter, const struct render_frame *frame,
-                          const struct render_table *tables, dipole_status *status)
+                          dipole_status *status)
 {
+    const struct render_table *const tables = frame->tables;
     struct batch batch = { 0 };
     size_t first_node = 0;
     bool done = fill_table(splatter, frame, tables, status);
     for (size_t m = 0; done && m < splatter->medium_count; m++)
         done = add_medium(splatter, frame->plan, m, &tables[m], &first_node, &batch, status);
     done = done && check_size(&batch, status);
-    splatter->splat_count = batch.splats.count;
+    splatter->splat_count += batch.splats.count;
     if (done && batch.splats.count > 0)
         draw_batch(splatter, frame, &batch);
     free(batch.samples);
@@ -317,7 +334,7 @@ struct render_light_samples *render_splatter_samples(struct render_splatter *spl
 
 size_t render_splatter_sample_count(const struct render_splatter *splatter)
 {
-    size_t count = 0;
+    size_t count = splatter->dropped_count;
     for (size_t m = 0; m < splatter->medium_count; m++)
         count += splatter->of_medium[m].bands[0].count;
     return count;

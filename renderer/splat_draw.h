@@ -14,13 +14,16 @@ void render_splatter_destroy(struct render_splatter *splatter);
 /* Forget the samples of the frame before. */
 void render_splatter_begin(struct render_splatter *splatter);
 
+/* Forget the samples that were drawn; they stay counted. */
+void render_splatter_drop_samples(struct render_splatter *splatter);
+
 /* Reduce the light's view that was just drawn to samples. */
 DIPOLE_CHECKED bool render_splatter_sample_view(struct render_splatter *splatter,
                                                 const struct render_frame *frame, dipole_status *status);
 
-/* Merge them band by band and draw them all, in one call. tables: of each medium. */
+/* Merge them band by band and draw them all, in one call. */
 DIPOLE_CHECKED bool render_splatter_draw(struct render_splatter *splatter, const struct render_frame *frame,
-                                         const struct render_table *tables, dipole_status *status);
+                                         dipole_status *status);
 
 /* The finest samples of a medium. */
 struct render_light_samples *render_splatter_samples(struct render_splatter *splatter, size_t medium);

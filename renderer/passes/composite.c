@@ -1,5 +1,6 @@
 /* The picture: radiosity leaves through the surface toward the eye (theory.md T14), specular light is
  * added, and the four points of each pixel are averaged. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -11,6 +12,12 @@ static struct render_decision decide(const struct render_request *request, const
     if (request->is_captured)
         return render_not_called_for("its parts are captured instead");
     return render_called_for("4 points per pixel");
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+           render_cost_ms(RENDER_COST_COMPOSITE_PIXEL, plan->covered_px);
 }
 
 static void bind(const struct render_frame *frame)
@@ -32,6 +39,7 @@ const struct render_effect render_effect_composite = {
     .name = "composite",
     .source = "Fresnel exit normalised to the radiosity",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

@@ -1,5 +1,6 @@
 /* Scattering that never leaves the spot: radiosity = total reflectance times irradiance that enters. What
  * an opaque material would show, and what is right where r_max is under a pixel. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -19,6 +20,12 @@ static struct render_decision decide(const struct render_request *request, const
     if (request->technique == RENDER_TECHNIQUE_LAMBERT)
         return render_called_for("asked for");
     return render_called_for("scattered light stays within %.2g pixels", plan->r_max_px);
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           (double)plan->view_count * render_cost_ms(RENDER_COST_SHADOW_PIXEL, plan->covered_px);
 }
 
 static void bind(const struct render_frame *frame)
@@ -42,6 +49,7 @@ const struct render_effect render_effect_lambert = {
     .name = "lambert",
     .source = "Lambert 1760",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

@@ -1,5 +1,6 @@
 /* The light's view, reduced to samples no farther apart than the profile's spectrum allows (theory.md T11,
  * T13). */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/splat_draw.h"
 
@@ -17,6 +18,16 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no channel scatters");
     return render_called_for("%.3g mm apart keep aliasing under %.3g", plan->spacing_mm,
                              plan->aliasing_epsilon);
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return render_cost_ms(RENDER_COST_READ_TEXEL, render_cost_view_texels(plan));
+}
+
+static double error(const struct render_plan *plan)
+{
+    return plan->aliasing_error + plan->blur_error;
 }
 
 static bool sample(const struct render_frame *frame, dipole_status *status)
@@ -39,6 +50,8 @@ const struct render_effect render_effect_light_samples = {
     .name = "light_samples",
     .source = "Shah, Konttinen and Pattanaik 2009; spacing by the sampling theorem",
     .decide = decide,
+    .cost_ms = cost_ms,
+    .error = error,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

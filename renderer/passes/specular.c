@@ -1,4 +1,5 @@
 /* Light mirrored at the rough surface: GGX, with the shadows of the light's view (theory.md T19). */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -12,6 +13,12 @@ static struct render_decision decide(const struct render_request *request, const
     if (plan->lit_count == 0)
         return render_not_called_for("no light shines");
     return render_called_for("an object is glossy");
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           (double)plan->view_count * render_cost_ms(RENDER_COST_SHADOW_PIXEL, plan->covered_px);
 }
 
 static void bind(const struct render_frame *frame)
@@ -36,6 +43,7 @@ const struct render_effect render_effect_specular = {
     .name = "specular",
     .source = "GGX, Walter et al. 2007; height-correlated Smith, Heitz 2014",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

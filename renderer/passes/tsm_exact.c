@@ -1,4 +1,5 @@
 /* The sources of a map's medium in place of its volume: what is left is not the table's error. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/tsm_draw.h"
 
@@ -15,6 +16,14 @@ static struct render_decision decide(const struct render_request *request, const
                              render_tsm_response_names[request->tsm.response]);
 }
 
+/* Of a volume, or of factors and sources: baked and uploaded. */
+#define BAKE_MS 15.0
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return BAKE_MS * (double)plan->media->count;
+}
+
 static const struct render_pass passes[] = {
     { .name = "tsm_exact",
       .draw = RENDER_DRAW_NOTHING,
@@ -27,6 +36,7 @@ const struct render_effect render_effect_tsm_exact = {
     .name = "tsm_exact",
     .source = "sources of the model, theory.md T30",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

@@ -1,7 +1,10 @@
 /* The global response of translucent shadow maps: light through the volume, from the samples of the
  * pattern. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/tsm_draw.h"
+
+#include <math.h>
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -17,6 +20,22 @@ static struct render_decision decide(const struct render_request *request, const
     if (request->tsm.part == RENDER_TSM_LOCAL)
         return render_not_called_for("the local part alone is asked for");
     return render_called_for("at each fragment; what the samples miss is not bounded");
+}
+
+/* Of the usual pattern. */
+enum { SAMPLES = 21 };
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           render_cost_ms(RENDER_COST_MAP_SAMPLE, SAMPLES * render_cost_map_pixels(plan));
+}
+
+/* Nothing bounds what so few samples make of an arbitrary shape. */
+static double error(const struct render_plan *plan)
+{
+    (void)plan;
+    return INFINITY;
 }
 
 static void bind(const struct render_frame *frame)
@@ -40,6 +59,8 @@ const struct render_effect render_effect_tsm_global = {
     .name = "tsm_global",
     .source = "Dachsbacher and Stamminger 2003, section 4",
     .decide = decide,
+    .cost_ms = cost_ms,
+    .error = error,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

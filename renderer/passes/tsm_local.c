@@ -1,5 +1,6 @@
 /* The local response of translucent shadow maps: the peak near where light enters, which no sample of the
  * pattern resolves. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/tsm_draw.h"
 
@@ -15,6 +16,15 @@ static struct render_decision decide(const struct render_request *request, const
     if (request->tsm.part == RENDER_TSM_GLOBAL)
         return render_not_called_for("the global part alone is asked for");
     return render_called_for("%d x %d cells about each fragment", LUT_TSM_LOCAL_SIDE, LUT_TSM_LOCAL_SIDE);
+}
+
+/* And the inner samples of the pattern. */
+enum { CELLS = LUT_TSM_LOCAL_SIDE * LUT_TSM_LOCAL_SIDE + 5 };
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           render_cost_ms(RENDER_COST_MAP_SAMPLE, CELLS * render_cost_map_pixels(plan));
 }
 
 static void bind(const struct render_frame *frame)
@@ -39,6 +49,7 @@ const struct render_effect render_effect_tsm_local = {
     .name = "tsm_local",
     .source = "Dachsbacher and Stamminger 2003, section 4.2",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

@@ -1,5 +1,6 @@
 /* Every texel of a translucent shadow map in place of the pattern's samples: slow, to measure what these
  * miss. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/tsm_draw.h"
 
@@ -14,6 +15,15 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("the samples of the pattern are summed");
     return render_called_for("response \"%s\" is asked for",
                              render_tsm_response_names[request->tsm.response]);
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->map_count; i++)
+        count +=
+            plan->objects[plan->maps[i].object].pixel_count * plan->maps[i].size_px * plan->maps[i].size_px;
+    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_MAP_EVALUATION, count);
 }
 
 static void bind(const struct render_frame *frame)
@@ -56,6 +66,7 @@ const struct render_effect render_effect_tsm_texels = {
     .name = "tsm_texels",
     .source = "the sum that Dachsbacher and Stamminger 2003 approximate",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

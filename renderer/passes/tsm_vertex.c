@@ -1,6 +1,9 @@
 /* The global response gathered at the meshes' vertices, and interpolated between them. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/tsm_draw.h"
+
+#include <math.h>
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -14,6 +17,25 @@ static struct render_decision decide(const struct render_request *request, const
     if (request->tsm.part == RENDER_TSM_LOCAL)
         return render_not_called_for("the local part alone is asked for");
     return render_called_for("at %zu vertices; what the samples miss is not bounded", plan->vertex_count);
+}
+
+/* Of the usual pattern. */
+enum { SAMPLES = 21 };
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return 3 * RENDER_COST_PROGRAM_MS +
+           render_cost_ms(RENDER_COST_MAP_SAMPLE,
+                          SAMPLES * (double)plan->vertex_count * (double)plan->map_count) +
+           render_cost_ms(RENDER_COST_TRIANGLE_4, (double)plan->triangle_count) +
+           render_cost_ms(RENDER_COST_SURFACE_PIXEL, render_cost_pixels(plan));
+}
+
+/* Nothing bounds what so few samples make of an arbitrary shape. */
+static double error(const struct render_plan *plan)
+{
+    (void)plan;
+    return INFINITY;
 }
 
 static void bind_gather(const struct render_frame *frame)
@@ -65,6 +87,8 @@ const struct render_effect render_effect_tsm_vertex = {
     .name = "tsm_vertex",
     .source = "Dachsbacher and Stamminger 2003, section 4.4",
     .decide = decide,
+    .cost_ms = cost_ms,
+    .error = error,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

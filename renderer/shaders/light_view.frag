@@ -14,6 +14,13 @@ layout(location = 0) out vec4 position_and_share;
 uniform float object;  // number, from 1
 layout(location = 1) out float light_object;
 #endif
+#ifdef HAS_LIGHT_IRRADIANCE
+#ifdef HAS_LIGHT_OBJECT
+layout(location = 2) out float light_irradiance;  // that enters, per rgb of the light
+#else
+layout(location = 1) out float light_irradiance;
+#endif
+#endif
 
 void main()
 {
@@ -23,6 +30,12 @@ void main()
     float size = texel_area * axis_cosine * axis_cosine * axis_cosine;
     float share = gl_FrontFacing ? size * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;
     position_and_share = vec4(position_ws_mm, share);
+#ifdef HAS_LIGHT_IRRADIANCE
+    vec3 step_mm = light.xyz - position_ws_mm;
+    float falloff = light.w > 0.0 ? 1.0 / dot(step_mm, step_mm) : 1.0;
+    light_irradiance =
+        gl_FrontFacing ? falloff * cosine * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;
+#endif
 #ifdef HAS_LIGHT_OBJECT
     light_object = object;
 #endif

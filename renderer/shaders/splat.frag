@@ -7,7 +7,7 @@ flat in ivec2 samples_of_splat;
 flat in vec4 ball_of_splat;
 flat in vec4 profile_of_splat;  // reach squared, mm^2; then as in common/profile.glsl
 flat in float object_of_splat;
-layout(location = 0) out vec4 radiosity_w_per_mm2;
+layout(location = 0) out vec4 radiosity_w_per_mm2;  // a: how many samples
 
 void main()
 {
@@ -20,13 +20,13 @@ void main()
     vec3 from_ball_mm = here_mm - ball_of_splat.xyz;
     if (dot(from_ball_mm, from_ball_mm) > ball_of_splat.w)
         discard;
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     int first = 2 * samples_of_splat.x, end = first + 2 * samples_of_splat.y;
     for (int i = first; i < end; i += 2) {
         vec3 step_mm = here_mm - texelFetch(light_samples, i).xyz;
         float distance2 = dot(step_mm, step_mm);
         if (distance2 <= profile_of_splat.x)
-            sum += texelFetch(light_samples, i + 1).rgb * profile_per_mm2(distance2, profile_of_splat.yzw);
+            sum += vec4(texelFetch(light_samples, i + 1).rgb * profile_per_mm2(distance2, profile_of_splat.yzw), 1.0);
     }
-    radiosity_w_per_mm2 = vec4(sum, 0.0);
+    radiosity_w_per_mm2 = sum;
 }

@@ -1,6 +1,8 @@
-// Pass surface: position (w: number of the object, from 1) and normal (w = roughness, 0 without gloss).
-centroid in vec3 position_ws_mm;
-centroid in vec3 normal_ws;
+// Pass surface: position (w: number of the object, from 1) and normal (w = roughness, 0 without gloss). The
+// interpolated w is 1, but in llvmpipe, which takes the depth of the pixel's middle for all its points: there
+// it is what the position must be divided by to lie on the surface.
+sample in vec4 position_ws_mm;
+sample in vec3 normal_ws;
 uniform float roughness;
 uniform float object;
 layout(location = 0) out vec4 position_out_mm;
@@ -8,6 +10,6 @@ layout(location = 1) out vec4 normal_out;
 
 void main()
 {
-    position_out_mm = vec4(position_ws_mm, object);
+    position_out_mm = vec4(position_ws_mm.xyz / position_ws_mm.w, object);
     normal_out = vec4(normalize(normal_ws), roughness);
 }
