@@ -151,6 +151,7 @@ static size_t point_maps(const struct io_scene *scene, struct render_plan *plan,
         return 1;
     }
     map.is_cube_face = true;
+    map.projection.near_mm *= 1 / (1 + CUBE_HALF_WIDTH); /* corners are farther away than they are deep */
     map.projection.half_width = map.projection.half_height = CUBE_HALF_WIDTH;
     choose_size(plan, 2 * CUBE_HALF_WIDTH * fmax(distance_mm, radius_mm), &map);
     for (int face = 0; face < 6; face++) {

@@ -77,37 +77,34 @@ static bool tables_for(struct renderer *renderer, const struct render_request *r
     return true;
 }
 
-/* The request's volumes, or those baked for it. */
-static bool volumes_for(struct renderer *renderer, const struct render_request *request,
-                        const struct render_plan *plan, const struct lut_tsm *const **volumes_out,
-                        dipole_status *status)
+/* Volumes for the request, if it has none and may need some: baked now and kept for later calls. */
+static bool add_volumes(struct renderer *renderer, struct render_request *request, dipole_status *status)
 {
-    *volumes_out = request->volumes;
-    if (request->volumes || plan->map_count == 0)
+    if (request->technique != RENDER_TECHNIQUE_TSM || request->volumes || request->is_captured)
         return true;
-    const double epsilon = render_volume_epsilon(plan->epsilon);
+    const double epsilon = render_volume_epsilon(request->epsilon);
     if (!renderer->volumes || renderer->volumes->epsilon > epsilon) {
         render_volumes_destroy(renderer->volumes);
         renderer->volumes = NULL;
         if (!render_volumes_bake(renderer->media, epsilon, &renderer->volumes, status))
             return false;
     }
-    *volumes_out = (const struct lut_tsm *const *)renderer->volumes->volumes;
+    request->volumes = (const struct lut_tsm *const *)renderer->volumes->volumes;
     return true;
 }
 
-bool render_run(struct renderer *renderer, const struct render_request *request,
+bool render_run(struct renderer *renderer, const struct render_request *request_in,
                 struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
 {
     const struct render_table *tables;
-    const struct lut_tsm *const *volumes;
+    struct render_request request = *request_in;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
     const bool done =
-        render_plan_create(request, &plan, status) && render_make_current(renderer, status) &&
-        tables_for(renderer, request, plan, &tables, status) &&
-        volumes_for(renderer, request, plan, &volumes, status) &&
-        render_executor_run(renderer->executor, request, plan, tables, volumes, time_ms, status);
+        render_plan_check_request(request.scene, request.epsilon, status) &&
+        add_volumes(renderer, &request, status) && render_plan_create(&request, &plan, status) &&
+        render_make_current(renderer, status) && tables_for(renderer, &request, plan, &tables, status) &&
+        render_executor_run(renderer->executor, &request, plan, tables, request.volumes, time_ms, status);
     if (done)
         *plan_out = plan;
     else

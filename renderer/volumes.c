@@ -36,6 +36,25 @@ void render_volumes_destroy(struct render_volumes *volumes)
     free(volumes);
 }
 
+/* As exact as asked, or as the model's sources allow (theory.md T30): the volume says how exact it is. */
+static bool volume_bake(const struct render_medium *medium, double epsilon, struct lut_tsm **lut_out,
+                        dipole_status *status)
+{
+    const double coarser[] = { 1, 3, 10 };
+    dipole_status why = { 0 };
+    bool is_done = false;
+    for (size_t i = 0; i < sizeof coarser / sizeof *coarser && !is_done; i++) {
+        const struct lut_request wanted = { .kind = LUT_TSM,
+                                            .materials = medium->material,
+                                            .material_count = 1,
+                                            .epsilon = fmin(coarser[i] * epsilon, LUT_EPSILON_MAX) };
+        is_done = lut_tsm_bake(&wanted, 0, lut_out, &why);
+        if (!is_done && why.code != DIPOLE_NOT_CONVERGED)
+            break;
+    }
+    return is_done || dipole_fail(status, why.code, NULL, "%s", why.message);
+}
+
 bool render_volumes_bake(const struct render_media *media, double epsilon,
                          struct render_volumes **volumes_out, dipole_status *status)
 {
@@ -43,11 +62,8 @@ bool render_volumes_bake(const struct render_media *media, double epsilon,
     struct render_volumes *const volumes = volumes_create(media, status);
     bool is_done = volumes != NULL;
     for (size_t m = 0; is_done && m < media->count; m++) {
-        const struct lut_request wanted = {
-            .kind = LUT_TSM, .materials = media->media[m].material, .material_count = 1, .epsilon = epsilon
-        };
         if (media->media[m].has_scattering)
-            is_done = lut_tsm_bake(&wanted, 0, &volumes->volumes[m], status);
+            is_done = volume_bake(&media->media[m], epsilon, &volumes->volumes[m], status);
     }
     if (is_done) {
         volumes->epsilon = epsilon;
