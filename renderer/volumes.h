@@ -15,8 +15,8 @@ struct render_volumes {
  * sources, costs more texels than it is worth to a sum of so few samples. */
 double render_volume_epsilon(double epsilon);
 
-/* A volume for each medium, to epsilon or up to ten times coarser where that is not reached; each tells its
- * error. Fails as lut_tsm_bake does. */
+/* A volume for each medium, to epsilon or as near as a usual size allows; each tells its error. Fails as
+ * lut_tsm_bake does. */
 DIPOLE_CHECKED bool render_volumes_bake(const struct render_media *media, double epsilon,
                                         struct render_volumes **volumes_out, dipole_status *status);
 
