@@ -40,22 +40,28 @@ void render_volumes_destroy(struct render_volumes *volumes)
  * that could be seen beside what the samples miss. */
 enum { SIDE_S = 64, SIDE_T = 128 };
 
-/* As exact as asked, or as the medium allows in so many texels: the volume says how exact it is. */
+/* As exact as asked, or nearly, in so many texels; else coarser in as many as that takes. */
 static bool volume_bake(const struct render_medium *medium, double epsilon, struct lut_tsm **lut_out,
                         dipole_status *status)
 {
-    struct lut_request wanted = { .kind = LUT_TSM,
-                                  .materials = medium->material,
-                                  .material_count = 1,
-                                  .epsilon = epsilon,
-                                  .size = { SIDE_S, SIDE_T } };
+    const struct {
+        double factor;
+        bool is_free;
+    } tries[] = { { 1, false }, { 2, false }, { 4, true }, { 10, true } };
     dipole_status why = { 0 };
-    while (!lut_tsm_bake(&wanted, 0, lut_out, &why)) {
-        if (why.code != DIPOLE_NOT_CONVERGED || wanted.epsilon == LUT_EPSILON_MAX)
-            return dipole_fail(status, why.code, NULL, "%s", why.message);
-        wanted.epsilon = fmin(2 * wanted.epsilon, LUT_EPSILON_MAX);
+    for (size_t i = 0; i < sizeof tries / sizeof *tries; i++) {
+        const struct lut_request wanted = { .kind = LUT_TSM,
+                                            .materials = medium->material,
+                                            .material_count = 1,
+                                            .epsilon = fmin(tries[i].factor * epsilon, LUT_EPSILON_MAX),
+                                            .size = { tries[i].is_free ? 0 : SIDE_S,
+                                                      tries[i].is_free ? 0 : SIDE_T } };
+        if (lut_tsm_bake(&wanted, 0, lut_out, &why))
+            return true;
+        if (why.code != DIPOLE_NOT_CONVERGED)
+            break;
     }
-    return true;
+    return dipole_fail(status, why.code, NULL, "%s", why.message);
 }
 
 bool render_volumes_bake(const struct render_media *media, double epsilon,
