@@ -159,11 +159,11 @@ static void all_texels_with_the_profile_are_the_splats(void **state)
     for (int i = 0; i < 3; i++) {
         struct test_scene test;
         const struct io_material material = skin1();
-        init(&test, IO_PRIMITIVE_SPHERE, 96, 5, &material);
+        init(&test, IO_PRIMITIVE_SPHERE, 96, 2, &material);
         if (i == 0)
             scene_add_directional(&test, 1, -0.5, -0.4, 3);
         else
-            scene_add_point(&test, i == 1 ? -25 : -4.6, 2.5, i == 1 ? 10 : 1.5, 300);
+            scene_add_point(&test, i == 1 ? -10 : -1.84, 1, i == 1 ? 4 : 0.6, 300);
         const struct render_options profile = by_maps(RENDER_TSM_PROFILE);
         const double off = difference(&test, &profile, &by_splats);
         struct render_report report;
@@ -182,11 +182,11 @@ static void samples_are_near_all_texels(void **state)
     for (int i = 0; i < 3; i++) {
         struct test_scene test;
         const struct io_material material = i == 1 ? marble() : skin1();
-        init(&test, IO_PRIMITIVE_SPHERE, 96, 5, &material);
+        init(&test, IO_PRIMITIVE_SPHERE, 96, 3, &material);
         if (i < 2)
             scene_add_directional(&test, 0.7, -0.5, -0.4, 3);
         else
-            scene_add_point(&test, -10, 6, 10, 300);
+            scene_add_point(&test, -6, 4, 6, 300);
         const struct render_options texels = by_maps(RENDER_TSM_TEXELS), exact = by_maps(RENDER_TSM_EXACT);
         const double off = difference(&test, &exact, &texels);
         print_message("  scene %d: %.2e\n", i, off);
@@ -284,8 +284,8 @@ static void a_far_point_light_is_directional(void **state)
         struct test_scene test, far;
         const double distance_mm = 3000;
         const struct io_material material = skin1();
-        init(&test, IO_PRIMITIVE_SPHERE, 96, 5, &material);
-        init(&far, IO_PRIMITIVE_SPHERE, 96, 5, &material);
+        init(&test, IO_PRIMITIVE_SPHERE, 96, 3, &material);
+        init(&far, IO_PRIMITIVE_SPHERE, 96, 3, &material);
         scene_add_directional(&test, -0.48, -0.6, -0.64, 3);
         scene_add_point(&far, 0.48 * distance_mm, 0.6 * distance_mm, 0.64 * distance_mm,
                         3 * distance_mm * distance_mm);
