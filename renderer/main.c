@@ -19,7 +19,7 @@ struct options {
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
     int technique, context, area;
-    int tsm_gather, tsm_response, tsm_part, layer_pairs;
+    int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
@@ -42,6 +42,10 @@ static const char *const context_names[] = { "osmesa", "egl", "window", NULL };
 
 /* Index i: 2 i surfaces, which come in pairs. */
 static const char *const layer_count_names[] = { "0", "2", "4", "6", "8", "10", "12", "14", "16", NULL };
+
+/* Index 0: the usual number, or whatever the volumes of a folder have. */
+static const char *const sample_count_names[] = { "usual", "13", "21", "53", "117", "245", NULL };
+static const int sample_counts[] = { 0, 13, 21, 53, 117, 245 };
 
 /* ---- results ------------------------------------------------------------------------------------ */
 
@@ -236,7 +240,8 @@ static bool find_tables(const struct job *job, struct render_tables **tables_out
     bool is_done = !folder || render_media_create(job->scene, &media, status);
     if (folder && is_done)
         is_done = job->options->technique == RENDER_TECHNIQUE_TSM
-                      ? render_volumes_find(folder, media, volumes_out, status)
+                      ? render_volumes_find(folder, media, sample_counts[job->options->tsm_samples],
+                                            volumes_out, status)
                       : render_tables_find(folder, media, tables_out, status);
     render_media_destroy(media);
     return is_done;
@@ -284,6 +289,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                                     .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
                                              .response = (enum render_tsm_response)options->tsm_response,
                                              .part = (enum render_tsm_part)options->tsm_part,
+                                             .sample_count = sample_counts[options->tsm_samples],
                                              .layer_count = 2 * options->layer_pairs } },
                        .frame_count = options->frames[1] - options->frames[0] + 1 };
     bool is_png = false, done = false;
@@ -353,6 +359,14 @@ int main(int argc, char **argv)
           .argument = "PART",
           .help = "sum, the default, or the global or the local response alone.",
           .choices = render_tsm_part_names },
+        { .name = "tsm-samples",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_samples,
+          .argument = "N",
+          .help = "Samples of a translucent shadow map for each point: 13, 21, 53, 117 or 245; usual, the "
+                  "default, "
+                  "is 21 as in the paper, or what the volumes in the folder of --luts have.",
+          .choices = sample_count_names },
         { .name = "peel",
           .kind = CLI_CHOICE,
           .target = &options.layer_pairs,

@@ -218,6 +218,9 @@ void render_plan_list_writes(const struct render_plan *plan, const struct render
 /* Whether the scene calls for a texture that a pass can write beside its others. */
 bool render_plan_wants(const struct render_plan *plan, const char *texture);
 
+/* Slices of a volume for so many samples, 0: the usual number; 0 when there is no such pattern. */
+int render_plan_slice_count(int sample_count);
+
 /* The texels of the largest map; 0 when there is none. */
 int render_plan_map_side_px(const struct render_plan *plan);
 

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define PI 3.14159265358979323846
+#define COUNT(array) (sizeof(array) / sizeof *(array))
 
 const char *const render_tsm_gather_names[] = { "fragment", "vertex", NULL };
 const char *const render_tsm_response_names[] = { "table", "exact", "texels", "profile", NULL };
@@ -15,7 +16,6 @@ const char *const render_tsm_part_names[] = { "sum", "global", "local", NULL };
 enum {
     MAP_SIDE_MIN = 64,
     MAP_SIDE_MAX = 2048,
-    USUAL_RING_SIDE = 9, /* of the pattern of 21 samples: so many inner squares wide */
     TEXELS_PER_CELL = 2, /* along a cell of the local response, at least             */
 };
 
@@ -28,6 +28,27 @@ enum {
 /* Faces of a cube overlap by so much: what a sample next to an edge averages is seen whole. */
 #define CUBE_HALF_WIDTH 2.0
 
+/* Patterns (lutgen/tsm_pattern.c): samples, slices of the volume, inner squares side by side. */
+static const struct {
+    int sample_count, slice_count;
+    double extent;
+} patterns[] = { { 21, 32, 9 }, { 13, 16, 3 }, { 53, 64, 16 }, { 117, 128, 36 }, { 245, 256, 29 } };
+
+/* The row of that many samples, 0 the usual; the end of the table when there is none. */
+static size_t find_pattern(int sample_count)
+{
+    size_t row = 0;
+    while (sample_count != 0 && row < COUNT(patterns) && patterns[row].sample_count != sample_count)
+        row++;
+    return row;
+}
+
+int render_plan_slice_count(int sample_count)
+{
+    const size_t row = find_pattern(sample_count);
+    return row < COUNT(patterns) ? patterns[row].slice_count : 0;
+}
+
 static bool is_all_texels(enum render_tsm_response response)
 {
     return response == RENDER_TSM_TEXELS || response == RENDER_TSM_PROFILE;
@@ -37,6 +58,9 @@ static bool check_options(const struct render_request *request, const struct ren
                           dipole_status *status)
 {
     const struct render_tsm_options *const tsm = &request->tsm;
+    if (render_plan_slice_count(tsm->sample_count) == 0)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%d samples, expected 13, 21, 53, 117 or 245",
+                           tsm->sample_count);
     if (tsm->layer_count < 0 || tsm->layer_count > RENDER_TSM_LAYER_LIMIT || tsm->layer_count % 2 != 0)
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%d layers, expected an even number up to %d",
                            tsm->layer_count, RENDER_TSM_LAYER_LIMIT);
@@ -62,10 +86,10 @@ static void find_patterns(const struct render_request *request, struct render_pl
         struct render_plan_medium *const planned = &plan->of_medium[m];
         if (!planned->is_visible || !plan->media->media[m].has_scattering)
             continue;
-        planned->inner_mm =
-            request->volumes
-                ? request->volumes[m]->inner_mm
-                : 2 * render_medium_r_max_mm(&plan->media->media[m], EXTENT_EPSILON) / USUAL_RING_SIDE;
+        planned->inner_mm = request->volumes
+                                ? request->volumes[m]->inner_mm
+                                : 2 * render_medium_r_max_mm(&plan->media->media[m], EXTENT_EPSILON) /
+                                      patterns[find_pattern(request->tsm.sample_count)].extent;
     }
 }
 

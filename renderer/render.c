@@ -83,10 +83,14 @@ static bool add_volumes(struct renderer *renderer, struct render_request *reques
     if (request->technique != RENDER_TECHNIQUE_TSM || request->volumes || request->is_captured)
         return true;
     const double epsilon = render_volume_epsilon(request->epsilon);
-    if (!renderer->volumes || renderer->volumes->epsilon > epsilon) {
+    const int slice_count = render_plan_slice_count(request->tsm.sample_count);
+    if (slice_count == 0) /* the plan tells */
+        return true;
+    if (!renderer->volumes || renderer->volumes->epsilon > epsilon ||
+        renderer->volumes->slice_count != slice_count) {
         render_volumes_destroy(renderer->volumes);
         renderer->volumes = NULL;
-        if (!render_volumes_bake(renderer->media, epsilon, &renderer->volumes, status))
+        if (!render_volumes_bake(renderer->media, epsilon, slice_count, &renderer->volumes, status))
             return false;
     }
     request->volumes = (const struct lut_tsm *const *)renderer->volumes->volumes;

@@ -88,8 +88,9 @@ struct render_tsm_options {
     enum render_tsm_gather gather;
     enum render_tsm_response response;
     enum render_tsm_part part;
-    int layer_count; /* 0: all between a point and where its light entered is taken for solid; else so many
-                        surfaces behind each other, even, up to RENDER_TSM_LAYER_LIMIT, tell what is air */
+    int sample_count; /* of the pattern: 13, 21, 53, 117 or 245; 0: 21, or what the volumes have */
+    int layer_count;  /* 0: all between a point and where its light entered is taken for solid; else so many
+                         surfaces behind each other, even, up to RENDER_TSM_LAYER_LIMIT, tell what is air */
 };
 enum { RENDER_TSM_LAYER_LIMIT = 16 };
 

@@ -41,8 +41,8 @@ void render_volumes_destroy(struct render_volumes *volumes)
 enum { SIDE_S = 64, SIDE_T = 128 };
 
 /* As exact as asked, or nearly, in so many texels; else coarser in as many as that takes. */
-static bool volume_bake(const struct render_medium *medium, double epsilon, struct lut_tsm **lut_out,
-                        dipole_status *status)
+static bool volume_bake(const struct render_medium *medium, double epsilon, int slice_count,
+                        struct lut_tsm **lut_out, dipole_status *status)
 {
     const struct {
         double factor;
@@ -55,7 +55,7 @@ static bool volume_bake(const struct render_medium *medium, double epsilon, stru
                                             .material_count = 1,
                                             .epsilon = fmin(tries[i].factor * epsilon, LUT_EPSILON_MAX),
                                             .size = { tries[i].is_free ? 0 : SIDE_S,
-                                                      tries[i].is_free ? 0 : SIDE_T } };
+                                                      tries[i].is_free ? 0 : SIDE_T, slice_count } };
         if (lut_tsm_bake(&wanted, 0, lut_out, &why))
             return true;
         if (why.code != DIPOLE_NOT_CONVERGED)
@@ -64,7 +64,7 @@ static bool volume_bake(const struct render_medium *medium, double epsilon, stru
     return dipole_fail(status, why.code, NULL, "%s", why.message);
 }
 
-bool render_volumes_bake(const struct render_media *media, double epsilon,
+bool render_volumes_bake(const struct render_media *media, double epsilon, int slice_count,
                          struct render_volumes **volumes_out, dipole_status *status)
 {
     *volumes_out = NULL;
@@ -72,10 +72,11 @@ bool render_volumes_bake(const struct render_media *media, double epsilon,
     bool is_done = volumes != NULL;
     for (size_t m = 0; is_done && m < media->count; m++) {
         if (media->media[m].has_scattering)
-            is_done = volume_bake(&media->media[m], epsilon, &volumes->volumes[m], status);
+            is_done = volume_bake(&media->media[m], epsilon, slice_count, &volumes->volumes[m], status);
     }
     if (is_done) {
         volumes->epsilon = epsilon;
+        volumes->slice_count = slice_count;
         *volumes_out = volumes;
     } else {
         render_volumes_destroy(volumes);
@@ -110,15 +111,17 @@ static void take_volume(struct lut_tsm *lut, const struct render_media *media,
 }
 
 static bool read_volume(const char *folder, const char *name, const struct render_media *media,
-                        struct render_volumes *volumes, dipole_status *status)
+                        int sample_count, struct render_volumes *volumes, dipole_status *status)
 {
     char *path = NULL;
     struct lut_tsm *lut = NULL;
     if (asprintf(&path, "%s/%s", folder, name) < 0)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the path of a volume");
     const bool is_done = lut_tsm_read(path, &lut, status);
-    if (is_done)
+    if (is_done && (sample_count == 0 || lut->sample_count == sample_count))
         take_volume(lut, media, volumes);
+    else
+        lut_tsm_destroy(lut);
     free(path);
     return is_done;
 }
@@ -138,7 +141,7 @@ static bool check_found(const char *folder, const struct render_media *media,
     return true;
 }
 
-bool render_volumes_find(const char *folder, const struct render_media *media,
+bool render_volumes_find(const char *folder, const struct render_media *media, int sample_count,
                          struct render_volumes **volumes_out, dipole_status *status)
 {
     const dipole_place place = { .source = folder };
@@ -151,7 +154,7 @@ bool render_volumes_find(const char *folder, const struct render_media *media,
     struct render_volumes *const volumes = volumes_create(media, status);
     bool is_done = volumes != NULL;
     for (int i = 0; i < count; i++) {
-        is_done = is_done && read_volume(folder, entries[i]->d_name, media, volumes, status);
+        is_done = is_done && read_volume(folder, entries[i]->d_name, media, sample_count, volumes, status);
         free(entries[i]);
     }
     free(entries);
