@@ -111,10 +111,10 @@ static void pattern_fill(const struct lut_tsm *lut, struct render_buffer_texture
     render_buffer_texture_fill(pattern, GL_RGBA32F, texels, (size_t)lut->sample_count * sizeof *texels);
 }
 
-/* How far a cell of the local response may lie: as deep as its proximity reaches, or a little more. */
+/* How far a sample may lie. */
 static double form_reach_mm(const struct lut_tsm *lut)
 {
-    return 2 * lut->inner_mm;
+    return 2 * lut->depth_max_mm;
 }
 
 /* Row after row of one cosine, -1 to 1; distances scale sinh(u asinh(reach/scale)). */
@@ -360,8 +360,8 @@ static void set_table(GLuint program, const struct lut_tsm *lut)
     render_set_float(program, "tsm_table.depth_max_mm", lut->depth_max_mm);
     render_set_vec3(program, "tsm_table.scale", lut->scale);
     render_set_float(program, "local_width_mm", lut->inner_mm / LUT_TSM_LOCAL_SIDE);
-    render_set_float(program, "local_scale_mm", lut->local_depth_scale_mm);
-    render_set_float(program, "local_reach_mm", form_reach_mm(lut));
+    render_set_float(program, "form_scale_mm", lut->local_depth_scale_mm);
+    render_set_float(program, "form_reach_mm", form_reach_mm(lut));
     render_set_float(program, "inner_mm", lut->inner_mm);
 }
 

@@ -1,30 +1,12 @@
 // Pass tsm_local: radiosity += the response to 7 x 7 cells about each fragment, of which the five inner samples of
 // the pattern leave to it what lies about as deep (theory.md T32, T34).
 #include "common/tsm_map.glsl"
+#include "common/tsm_form.glsl"
 uniform sampler2D position_mm;
 uniform samplerBuffer tsm_pattern;
 uniform samplerBuffer tsm_kernel;  // of each cell: mean over value in the middle, times area
 uniform float inner_mm, local_width_mm;
 layout(location = 0) out vec4 radiosity_w_per_mm2;
-
-#ifdef HAS_TSM_SOURCES
-#include "common/tsm_sources.glsl"
-
-vec3 local_form_per_mm2(float distance_mm, float cosine)
-{
-    return tsm_form_per_mm2(distance_mm, cosine);
-}
-#else
-uniform sampler2D tsm_form;  // R by distance, scale sinh(u asinh(reach/scale)), and cosine
-uniform float local_scale_mm, local_reach_mm;
-
-vec3 local_form_per_mm2(float distance_mm, float cosine)
-{
-    vec2 size = vec2(textureSize(tsm_form, 0));
-    float u = asinh(distance_mm / local_scale_mm) / asinh(local_reach_mm / local_scale_mm);
-    return textureLod(tsm_form, (vec2(u, 0.5 + 0.5 * cosine) * (size - 1.0) + 0.5) / size, 0.0).rgb;
-}
-#endif
 
 // lut_tsm_proximity is the same in C.
 float proximity(float dz_mm)
@@ -68,10 +50,11 @@ void main()
         if (part == 0.0 || !map_cell_at(plane, offset_mm, local_width_mm, cell))
             continue;
         vec3 delta_mm = here_mm.xyz - cell.position_mm;
-        float distance_mm = map_distance_mm(offset_mm, map_depth_mm(plane, here_mm.xyz, cell.position_mm));
+        float dz_mm = map_depth_mm(plane, here_mm.xyz, cell.position_mm);
+        float distance_mm = map_distance_mm(offset_mm * map_spread(plane, dz_mm), dz_mm);
         vec3 normal = map_normal(cell, delta_mm, distance_mm);
         float cosine = clamp(dot(normal, delta_mm) / max(length(delta_mm), 1e-20), -1.0, 1.0);
-        sum += part * texelFetch(tsm_kernel, i).rgb * local_form_per_mm2(distance_mm, cosine) * cell.flux_per_mm2;
+        sum += part * texelFetch(tsm_kernel, i).rgb * tsm_form_at(distance_mm, cosine) * cell.flux_per_mm2;
     }
     radiosity_w_per_mm2 = vec4(sum, 0.0);
 }

@@ -47,6 +47,13 @@ float map_depth_mm(map_plane plane, vec3 a_mm, vec3 b_mm)
     return dot(a_mm - b_mm, plane.along);
 }
 
+// Light of a point spreads: how wide the plane's cells are where light enters that is dz_mm less deep, over how wide
+// they are in the plane.
+float map_spread(map_plane plane, float dz_mm)
+{
+    return light.w == 0.0 ? 1.0 : clamp(1.0 - dz_mm / plane.distance_mm, 0.1, 10.0);
+}
+
 // What is in one cell of it.
 struct map_cell {
     vec3 position_mm, normal;  // means of what is covered
