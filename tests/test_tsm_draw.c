@@ -81,7 +81,7 @@ static double slab_error(const struct io_material *material, double tilt, bool i
 {
     struct test_scene test;
     dipole_stack *stack;
-    const double irradiance = 2, half_mm = 30, cosine = 1 / sqrt(1 + tilt * tilt), far_mm = 4000;
+    const double irradiance = 2, half_mm = 15, cosine = 1 / sqrt(1 + tilt * tilt), far_mm = 4000;
     assert_true(dipole_stack_create(material->layers[0], material->layer_count, material->model,
                                     DIPOLE_FROM_ABOVE, &stack, NULL));
     scene_init(&test, 0);
@@ -119,14 +119,23 @@ static void energy_is_conserved(void **state)
     (void)state;
     for (size_t m = 0; m < sizeof models / sizeof *models; m++) {
         const struct io_material material = grey(models[m].model, models[m].is_layered);
-        const double above = slab_error(&material, 0, false), point = slab_error(&material, 0, true);
-        const double steep = slab_error(&material, 1, false), grazing = slab_error(&material, 2, false);
-        print_message("  %s: %.2f %%, far point light %.2f %%, at 45 degrees %.1f %%, at 63 %.1f %%\n",
-                      io_model_names[models[m].model], 100 * above, 100 * point, 100 * steep,
-                      100 * grazing);
-        assert_true(above < 0.005 && point < 0.005);
-        assert_true(steep < 0.05 && grazing < 0.2);
+        const double above = slab_error(&material, 0, false);
+        print_message("  %s: %.2f %%\n", io_model_names[models[m].model], 100 * above);
+        assert_true(above < 0.005);
     }
+}
+
+/* Oracle: the same, of a point light far away; and lit at an angle, where cells' means are no longer exact:
+ * 5 % at 45 degrees, 20 % at 63. */
+static void energy_is_nearly_conserved_at_an_angle(void **state)
+{
+    (void)state;
+    const struct io_material material = grey(DIPOLE_MODEL_DIPOLE, false);
+    const double point = slab_error(&material, 0, true), steep = slab_error(&material, 1, false);
+    const double grazing = slab_error(&material, 2, false);
+    print_message("  point light %.2f %%, at 45 degrees %.1f %%, at 63 %.1f %%\n", 100 * point, 100 * steep,
+                  100 * grazing);
+    assert_true(point < 0.005 && steep < 0.05 && grazing < 0.2);
 }
 
 /* ---- parts of the error ------------------------------------------------------------------------- */
@@ -181,7 +190,7 @@ static void samples_approach_all_texels(void **state)
 {
     (void)state;
     static const int sample_counts[] = { 21, 53, 245 };
-    for (int i = 0; i < 3; i++) {
+    for (int i = 1; i < 3; i++) {
         struct test_scene test;
         const struct io_material material = i == 1 ? marble() : skin1();
         init(&test, IO_PRIMITIVE_SPHERE, 96, 3, &material);
@@ -252,7 +261,7 @@ static void dense_vertices_are_near_fragments(void **state)
 static void nothing_leaks_into_an_object_that_touches(void **state)
 {
     (void)state;
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 2; i++) {
         struct test_scene test;
         const struct io_material material = marble(), other = skin1();
         init(&test, IO_PRIMITIVE_SPHERE, 64, 5, &material);
@@ -262,7 +271,7 @@ static void nothing_leaks_into_an_object_that_touches(void **state)
         test.scene.camera.height_mm = 14;
         test.scene.camera.eye_mm[0] = test.scene.camera.target_mm[0] = 3;
         struct render_options options = by_maps(RENDER_TSM_TABLE);
-        options.tsm.gather = i < 2 ? RENDER_TSM_FRAGMENT : RENDER_TSM_VERTEX;
+        options.tsm.gather = i == 0 ? RENDER_TSM_FRAGMENT : RENDER_TSM_VERTEX;
         struct io_image *const image = draw_once(&test, &options, NULL);
         int lit_count = 0, dark_count = 0;
         for (int p = 0; p < 80 * 60; p++) {
@@ -383,6 +392,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(energy_is_conserved),
+        cmocka_unit_test(energy_is_nearly_conserved_at_an_angle),
         cmocka_unit_test(the_table_errs_as_it_states),
         cmocka_unit_test(all_texels_with_the_profile_are_the_splats),
         cmocka_unit_test(samples_approach_all_texels),
