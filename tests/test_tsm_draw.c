@@ -6,6 +6,8 @@
 
 #include <unistd.h>
 
+enum { WIDTH = 60, HEIGHT = 44 };
+
 /* ---- what the tests share ----------------------------------------------------------------------- */
 
 static const struct render_options by_splats = { .technique = RENDER_TECHNIQUE_SPLAT, .epsilon = 0.005 };
@@ -15,13 +17,13 @@ static struct render_options by_maps(enum render_tsm_response response)
     return (struct render_options){ .technique = RENDER_TECHNIQUE_TSM, .tsm = { .response = response } };
 }
 
-/* One object of a shape, 80 x 60 pixels, no light yet. */
+/* One object of a shape, no light yet. */
 static void init(struct test_scene *test, enum io_primitive primitive, int detail, double scale_mm,
                  const struct io_material *material)
 {
     scene_init(test, 4.5 * scale_mm);
-    test->scene.camera.width_px = 80;
-    test->scene.camera.height_px = 60;
+    test->scene.camera.width_px = WIDTH;
+    test->scene.camera.height_px = HEIGHT;
     assert_true(scene_add(test, primitive, detail, scale_mm, 0, material));
 }
 
@@ -227,7 +229,7 @@ static void parts_add_up_to_the_sum(void **state)
         options.tsm.part = (enum render_tsm_part)i;
         parts[i] = draw(renderer, &options, NULL);
     }
-    for (size_t i = 0; i < 80 * 60 * 4; i++)
+    for (size_t i = 0; i < WIDTH * HEIGHT * 4; i++)
         assert_true(i % 4 == 3 ||
                     fabsf(parts[RENDER_TSM_GLOBAL]->pixels[i] + parts[RENDER_TSM_LOCAL]->pixels[i] -
                           parts[RENDER_TSM_SUM]->pixels[i]) <= 1e-5f * parts[RENDER_TSM_SUM]->pixels[i]);
@@ -274,15 +276,15 @@ static void nothing_leaks_into_an_object_that_touches(void **state)
         options.tsm.gather = i == 0 ? RENDER_TSM_FRAGMENT : RENDER_TSM_VERTEX;
         struct io_image *const image = draw_once(&test, &options, NULL);
         int lit_count = 0, dark_count = 0;
-        for (int p = 0; p < 80 * 60; p++) {
-            const double x_mm = 3 + (p % 80 + 0.5 - 40) * 14.0 / 60;
+        for (int p = 0; p < WIDTH * HEIGHT; p++) {
+            const double x_mm = 3 + (p % WIDTH + 0.5 - WIDTH / 2) * 14.0 / HEIGHT;
             if (image->pixels[4 * p + 3] < 1 || fabs(x_mm - 5) < 0.3)
                 continue;
             lit_count += x_mm < 5 && image->pixels[4 * p] > 0;
             dark_count += x_mm > 5;
             assert_true(x_mm < 5 || image->pixels[4 * p] == 0);
         }
-        assert_true(lit_count > 1000 && dark_count > 300);
+        assert_true(lit_count > 500 && dark_count > 150);
         io_image_destroy(image);
         scene_end(&test);
     }
@@ -318,7 +320,7 @@ static void a_far_point_light_is_directional(void **state)
 static double mean_of(struct io_image *image)
 {
     double sum = 0;
-    for (size_t i = 0; i < 80 * 60; i++)
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
         sum += (double)image->pixels[4 * i];
     io_image_destroy(image);
     return sum;
