@@ -1,6 +1,6 @@
 /*
  * The converged picture that the fast techniques are measured against: the integral over the surface
- * itself, in double, on the CPU, without tables, cuts or light views. theory.md T33.
+ * itself, in double, on the CPU, without cuts or light views; objects of any media. theory.md T33.
  */
 #ifndef RENDERER_REFERENCE_H
 #define RENDERER_REFERENCE_H
@@ -15,11 +15,12 @@
 
 /*
  * Draw the scene as render_draw does, without OpenGL. Samples are doubled until their error, estimated from
- * two halves and from the sum before as the largest over the channels of the relative RMSE over the
- * picture, is at most RENDER_REFERENCE_SHARE options->epsilon, and they are nearer to each other than the
- * shortest mean free path. options->technique and table are not looked at. *report_out may be NULL. Memory:
- * 88 bytes a pixel, 64 a triangle beside Embree's, 50 MB for samples, whatever their number. Fails with
- * DIPOLE_BAD_VALUE, DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED; *image_out is then NULL.
+ * two halves and from the sum before over some 800 pixels or more as the largest over the channels of the
+ * relative RMSE over the picture, is at most RENDER_REFERENCE_SHARE options->epsilon, and they are nearer
+ * to each other than the shortest mean free path. options->technique and table are not looked at.
+ * *report_out may be NULL. Memory: 88 bytes a pixel, 64 a triangle beside Embree's, at most 400 MB for
+ * samples, whatever their number. Fails with DIPOLE_BAD_VALUE, DIPOLE_OUT_OF_MEMORY or
+ * DIPOLE_NOT_SUPPORTED; *image_out is then NULL.
  */
 DIPOLE_CHECKED bool render_reference_draw(const struct io_scene *scene,
                                           const struct render_options *options, struct io_image **image_out,

@@ -1,5 +1,7 @@
 #include "renderer/reference_pixel.h"
 
+#include "renderer/plan.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -8,12 +10,12 @@
 /* ---- rays --------------------------------------------------------------------------------------- */
 
 /* A ray from the camera's near plane through a place in the picture, in pixels from the top left. */
-static void camera_ray(const struct render_plan *plan, double x_px, double y_px, double origin_mm[3],
+static void camera_ray(const struct render_pixel_view *view, double x_px, double y_px, double origin_mm[3],
                        double direction[3])
 {
-    const struct render_projection *const camera = &plan->camera;
-    const double across = (2 * x_px / plan->width_px - 1) * camera->half_width;
-    const double up = (1 - 2 * y_px / plan->height_px) * camera->half_height;
+    const struct render_projection *const camera = &view->camera;
+    const double across = (2 * x_px / view->width_px - 1) * camera->half_width;
+    const double up = (1 - 2 * y_px / view->height_px) * camera->half_height;
     for (int k = 0; k < 3; k++) {
         const double aside = across * camera->right[k] + up * camera->up[k];
         direction[k] = camera->forward[k] + (camera->is_orthographic ? 0 : aside);
@@ -36,7 +38,8 @@ static void add_hit(const struct render_pixel_view *view, const struct render_su
     int g = 0;
     while (g < pixel->group_count &&
            (pixel->groups[g].points[0].object != hit->object ||
-            distance_mm(hit->position_mm, pixel->groups[g].points[0].position_mm) > view->group_mm))
+            distance_mm(hit->position_mm, pixel->groups[g].points[0].position_mm) >
+                view->media[hit->object].group_mm))
         g++;
     if (g == pixel->group_count)
         pixel->groups[pixel->group_count++].count = 0;
@@ -54,7 +57,7 @@ void render_pixel_trace(const struct render_pixel_view *view, int x, int y, stru
         const double y_px = y + (line + 0.5) / RENDER_PIXEL_SIDE;
         double origin_mm[3], direction[3];
         struct render_surface_point hit;
-        camera_ray(view->plan, x_px, y_px, origin_mm, direction);
+        camera_ray(view, x_px, y_px, origin_mm, direction);
         if (render_tracer_find(view->tracer, origin_mm, direction, &hit))
             add_hit(view, &hit, pixel);
     }
@@ -62,9 +65,9 @@ void render_pixel_trace(const struct render_pixel_view *view, int x, int y, stru
 
 /* ---- light -------------------------------------------------------------------------------------- */
 
-static void toward_eye(const struct render_plan *plan, const double position_mm[3], double to_eye[3])
+static void toward_eye(const struct render_projection *camera, const double position_mm[3],
+                       double to_eye[3])
 {
-    const struct render_projection *const camera = &plan->camera;
     const double away_mm = distance_mm(camera->eye_mm, position_mm);
     for (int k = 0; k < 3; k++)
         to_eye[k] =
@@ -74,12 +77,13 @@ static void toward_eye(const struct render_plan *plan, const double position_mm[
 double render_pixel_exit_per_sr(const struct render_pixel_view *view,
                                 const struct render_surface_point *point)
 {
+    const struct render_pixel_medium *const medium = &view->media[point->object];
     double to_eye[3];
-    toward_eye(view->plan, point->position_mm, to_eye);
+    toward_eye(&view->camera, point->position_mm, to_eye);
     /* Interpolated normals may lean away from the eye near the silhouette: mirrored, as common/exit.glsl.
      */
     const double cosine = fmin(fabs(render_dot(point->normal, to_eye)), 1);
-    return (1 - dipole_fresnel_reflectance(view->plan->eta, cosine)) * view->exit_scale_per_sr;
+    return (1 - dipole_fresnel_reflectance(medium->eta, cosine)) * medium->exit_scale_per_sr;
 }
 
 bool render_light_reaches(const struct render_tracer *tracer, const struct io_light *light,
@@ -115,7 +119,7 @@ static double mirrored_per_sr(const struct render_pixel_view *view,
                               const struct render_surface_point *point, const double to_light[3])
 {
     double to_eye[3], middle[3];
-    toward_eye(view->plan, point->position_mm, to_eye);
+    toward_eye(&view->camera, point->position_mm, to_eye);
     const double cosine_in = render_dot(point->normal, to_light);
     const double cosine_out = render_dot(point->normal, to_eye);
     if (cosine_in <= 0 || cosine_out <= 0)
@@ -124,7 +128,7 @@ static double mirrored_per_sr(const struct render_pixel_view *view,
         middle[k] = to_light[k] + to_eye[k];
     const double length = sqrt(render_dot(middle, middle));
     const double cosine_half = fmin(fmax(render_dot(to_light, middle) / length, 0), 1);
-    return dipole_fresnel_reflectance(view->plan->eta, cosine_half) *
+    return dipole_fresnel_reflectance(view->media[point->object].eta, cosine_half) *
            ggx(view->scene->objects[point->object].roughness, render_dot(point->normal, middle) / length,
                cosine_in, cosine_out);
 }

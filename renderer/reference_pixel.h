@@ -2,21 +2,27 @@
 #ifndef RENDERER_REFERENCE_PIXEL_H
 #define RENDERER_REFERENCE_PIXEL_H
 
-#include "renderer/plan.h"
+#include "renderer/projection.h"
 #include "renderer/reference_trace.h"
 
 /* Rays through a pixel, a square of them. */
 enum { RENDER_PIXEL_SIDE = 4, RENDER_PIXEL_RAYS = RENDER_PIXEL_SIDE * RENDER_PIXEL_SIDE };
 
-struct render_pixel_view {
-    const struct io_scene *scene;
-    const struct render_plan *plan; /* its scene, camera and medium are read */
-    const struct render_tracer *tracer;
-    double group_mm;          /* points of a group are no farther from its first */
-    double exit_scale_per_sr; /* 1 / (pi dipole_fdt_outside(eta)) */
+/* What a pixel asks of an object's medium. */
+struct render_pixel_medium {
+    double eta, exit_scale_per_sr; /* 1 / (pi dipole_fdt_outside(eta))             */
+    double group_mm;               /* points of a group are no farther from its first */
 };
 
-/* Surface points of a pixel within group_mm of the first. */
+struct render_pixel_view {
+    const struct io_scene *scene;
+    const struct render_tracer *tracer;
+    const struct render_pixel_medium *media; /* of each object */
+    struct render_projection camera;
+    int width_px, height_px;
+};
+
+/* Surface points of a pixel, of one object, within group_mm of the first. */
 struct render_pixel_group {
     struct render_surface_point points[RENDER_PIXEL_RAYS];
     int count;

@@ -1,84 +1,137 @@
 #include "renderer/reference_sum.h"
 
 #include "lutgen/parallel.h"
+#include "renderer/plan.h"
+#include "renderer/reference_tree.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 enum {
-    POINTS = 64,     /* in a cell, at which light is looked for         */
-    PART_CELLS = 64, /* for which one thread looks at a time            */
-    BATCH = 512,     /* distances whose profile is computed at once     */
-    SLOTS = RENDER_SUM_CHUNK * POINTS,
+    PART_POINTS = 4096, /* for which one thread looks at a time             */
+    TILE_PX = 4,        /* sides of a square of pixels with one cut of trees */
+    TILE_GROUPS = TILE_PX * TILE_PX * RENDER_PIXEL_RAYS,
 };
 
-/* Points of a cell are put together where they are no farther apart than this many widths of a cell. */
-#define EXTENT_LIMIT 2.5
+/* Groups of a tile share a cut within so many times the extent of a group. */
+#define TILE_SHARE 8
 
-/* Where light enters, one array for each quantity. */
-struct samples {
-    double position_mm[3][SLOTS], flux_w[IO_CHANNEL_COUNT][SLOTS];
+/* A singular profile is replaced within so many distances of points by a smooth one of the same power. */
+#define CORE_SPACINGS 2.0
+
+/* Points of a half at most, for which tables are laid out. */
+#define POINT_LIMIT 0x1p27
+
+/* A point of the surface, dark where its flux is 0. */
+struct sample {
+    double position_mm[3], flux_w[IO_CHANNEL_COUNT];
+    size_t object;
+};
+
+/* Light that enters an object. */
+struct entry {
+    struct render_tree_point *points; /* in the sum's array */
     size_t count;
-};
-
-/* Light at the points of a cell. */
-struct cell {
-    double position_mm[POINTS][3], flux_w[POINTS][IO_CHANNEL_COUNT];
+    struct render_tree *tree;
 };
 
 struct render_sum {
     const struct render_pixel_view *view;
     const struct render_surface *surface;
+    const struct render_media *media;
+    struct render_profile **profiles; /* of each medium; NULL where it scatters nothing */
     double area_mm2;
     int thread_count;
-    int twins[IO_CHANNEL_COUNT];     /* first channel of the same medium; -1: nothing is scattered */
-    size_t cell_count, first, count; /* of the surface; of the chunk */
-    int first_row;
+
+    /* of the chunk */
+    size_t first, count;
+    struct sample *samples; /* the first half, then the second */
+    struct render_tree_point *points;
+    struct entry *entries[2]; /* of each object, by half */
+
+    /* of the loops */
+    struct render_sum_pass pass;
+    int first_band;
     double *const *halves;
-    struct samples samples[2];
+    dipole_status *statuses; /* of each entry, both halves */
 };
 
-static bool is_same(const dipole_coefficients *a, const dipole_coefficients *b)
+static double spacing_mm(const struct render_sum *sum, double point_count)
 {
-    return a->sigma_a_per_mm == b->sigma_a_per_mm && a->sigma_s_prime_per_mm == b->sigma_s_prime_per_mm &&
-           a->fdr == b->fdr;
+    return sqrt(sum->area_mm2 / point_count);
 }
 
-static bool shines_in(const struct io_scene *scene, int channel)
+static bool create_profiles(struct render_sum *sum, dipole_status *status)
 {
-    for (size_t i = 0; i < scene->light_count; i++) {
-        if (scene->lights[i].rgb[channel] > 0)
-            return true;
+    const struct render_ball ball = render_ball_of_scene(sum->view->scene);
+    for (size_t i = 0; i < sum->media->count; i++) {
+        const struct render_medium *const medium = &sum->media->media[i];
+        if (medium->has_scattering &&
+            !render_profile_create(medium, 2 * ball.radius_mm, CORE_SPACINGS * spacing_mm(sum, POINT_LIMIT),
+                                   &sum->profiles[i], status))
+            return false;
     }
-    return false;
+    return true;
 }
 
 bool render_sum_create(const struct render_pixel_view *view, const struct render_surface *surface,
-                       int thread_count, struct render_sum **sum_out, dipole_status *status)
+                       const struct render_media *media, int thread_count, struct render_sum **sum_out,
+                       dipole_status *status)
 {
     *sum_out = NULL;
+    const size_t object_count = view->scene->object_count;
     struct render_sum *const sum = calloc(1, sizeof *sum);
     if (!sum)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %d samples of the surface",
-                           2 * SLOTS);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a sum");
     sum->view = view;
     sum->surface = surface;
+    sum->media = media;
     sum->area_mm2 = render_surface_area_mm2(surface);
     sum->thread_count = thread_count;
-    const dipole_coefficients *const k = view->plan->coefficients;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        sum->twins[c] = -1;
-        for (int other = c; other >= 0 && k[c].alpha_prime > 0 && shines_in(view->scene, c); other--) {
-            if (is_same(&k[c], &k[other]))
-                sum->twins[c] = other;
-        }
+    sum->profiles = calloc(media->count, sizeof(struct render_profile *));
+    sum->statuses = calloc(2 * object_count, sizeof *sum->statuses);
+    for (int half = 0; half < 2; half++)
+        sum->entries[half] = calloc(object_count, sizeof *sum->entries[half]);
+    if (!sum->profiles || !sum->statuses || !sum->entries[0] || !sum->entries[1]) {
+        render_sum_destroy(sum);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the light in %zu objects",
+                           object_count);
+    }
+    if (!create_profiles(sum, status)) {
+        render_sum_destroy(sum);
+        return false;
     }
     *sum_out = sum;
     return true;
 }
 
+static void forget_chunk(struct render_sum *sum)
+{
+    for (size_t i = 0; i < sum->view->scene->object_count; i++) {
+        for (int half = 0; half < 2; half++) {
+            if (sum->entries[half]) {
+                render_tree_destroy(sum->entries[half][i].tree);
+                sum->entries[half][i] = (struct entry){ 0 };
+            }
+        }
+    }
+    free(sum->samples);
+    free(sum->points);
+    sum->samples = NULL;
+    sum->points = NULL;
+}
+
 void render_sum_destroy(struct render_sum *sum)
 {
+    if (!sum)
+        return;
+    forget_chunk(sum);
+    for (size_t i = 0; i < sum->media->count && sum->profiles; i++)
+        render_profile_destroy(sum->profiles[i]);
+    free(sum->profiles);
+    free(sum->statuses);
+    free(sum->entries[0]);
+    free(sum->entries[1]);
     free(sum);
 }
 
@@ -108,179 +161,244 @@ static void light_point(const struct render_sum *sum, const struct render_surfac
             !render_light_reaches(sum->view->tracer, light, point, to_light, &falloff))
             continue;
         const double cosine = fmin(fmax(render_dot(point->normal, to_light), 0), 1);
-        const double entering = falloff * render_dot(point->facet_normal, to_light) *
-                                (1 - dipole_fresnel_reflectance(sum->view->plan->eta, cosine));
+        const double entering =
+            falloff * render_dot(point->facet_normal, to_light) *
+            (1 - dipole_fresnel_reflectance(sum->view->media[point->object].eta, cosine));
         for (int c = 0; c < IO_CHANNEL_COUNT; c++)
             flux_w[c] += area_mm2 * light->rgb[c] * entering;
     }
 }
 
-static double brightness(const double flux_w[IO_CHANNEL_COUNT])
+static struct render_profile *profile_of(const struct render_sum *sum, size_t object)
 {
-    return flux_w[0] + flux_w[1] + flux_w[2];
-}
-
-/* Diagonal of the box about the lit points begin .. end - 1. */
-static double extent_mm(const struct cell *cell, int begin, int end)
-{
-    double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
-    double diagonal2 = 0;
-    for (int i = begin; i < end; i++) {
-        for (int k = 0; k < 3 && brightness(cell->flux_w[i]) > 0; k++) {
-            min[k] = fmin(min[k], cell->position_mm[i][k]);
-            max[k] = fmax(max[k], cell->position_mm[i][k]);
-        }
-    }
-    for (int k = 0; k < 3; k++) {
-        const double side_mm = fmax(max[k] - min[k], 0);
-        diagonal2 += side_mm * side_mm;
-    }
-    return sqrt(diagonal2);
-}
-
-/* Put points begin .. end - 1 together: their flux at its middle. Where they are far apart, because the
- * line has gone on elsewhere, halves of them. The sample takes the slot of its first point. */
-static void put_together(const struct render_sum *sum, const struct cell *cell, int begin, int end,
-                         struct samples *samples, size_t slot)
-{
-    const double limit_mm = EXTENT_LIMIT * sqrt(sum->area_mm2 / (double)sum->cell_count);
-    if (end - begin > 1 && extent_mm(cell, begin, end) > limit_mm) {
-        const int middle = (begin + end) / 2;
-        put_together(sum, cell, begin, middle, samples, slot);
-        put_together(sum, cell, middle, end, samples, slot);
-        return;
-    }
-    double flux_w[IO_CHANNEL_COUNT] = { 0 }, moment[3] = { 0 };
-    for (int i = begin; i < end; i++) {
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            flux_w[c] += cell->flux_w[i][c];
-        for (int k = 0; k < 3; k++)
-            moment[k] += brightness(cell->flux_w[i]) * cell->position_mm[i][k];
-    }
-    const double light = brightness(flux_w);
-    for (int k = 0; k < 3 && light > 0; k++)
-        samples->position_mm[k][slot + (size_t)begin] = moment[k] / light;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        samples->flux_w[c][slot + (size_t)begin] = flux_w[c];
-}
-
-/* The cells of the second half begin in the middle of those of the first. */
-static void take_cell(struct render_sum *sum, int half, size_t index)
-{
-    struct samples *const samples = &sum->samples[half];
-    const double cell_count = (double)sum->cell_count, area_mm2 = sum->area_mm2 / cell_count / POINTS;
-    const uint64_t number = sum->first + index, seed = 2 * (uint64_t)sum->cell_count + (uint64_t)half;
-    struct cell cell;
-    for (int i = 0; i < POINTS; i++) {
-        const double within = (i + random_of(seed, number * POINTS + (uint64_t)i)) / POINTS;
-        const double place = ((double)number + within + 0.5 * half) / cell_count;
-        struct render_surface_point point;
-        render_surface_at(sum->surface, place < 1 ? place : place - 1, &point);
-        for (int k = 0; k < 3; k++)
-            cell.position_mm[i][k] = point.position_mm[k];
-        light_point(sum, &point, area_mm2, cell.flux_w[i]);
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            samples->flux_w[c][index * POINTS + (size_t)i] = 0;
-    }
-    put_together(sum, &cell, 0, POINTS, samples, index * POINTS);
+    return sum->profiles[sum->media->of_object[object]];
 }
 
 static void take_part(void *context, int part)
 {
     struct render_sum *const sum = context;
-    const size_t begin = (size_t)part * PART_CELLS;
+    const double point_count = (double)sum->pass.point_count;
+    const double area_mm2 = sum->area_mm2 / point_count * (sum->pass.is_joined ? 0.5 : 1);
+    const size_t begin = (size_t)part * PART_POINTS;
     for (int half = 0; half < 2; half++) {
-        for (size_t i = begin; i < begin + PART_CELLS && i < sum->count; i++)
-            take_cell(sum, half, i);
+        const uint64_t seed = 2 * (uint64_t)sum->pass.point_count + (uint64_t)half;
+        for (size_t i = begin; i < begin + PART_POINTS && i < sum->count; i++) {
+            const uint64_t number = sum->first + i;
+            struct sample *const sample = &sum->samples[(half == 1 ? sum->count : 0) + i];
+            struct render_surface_point point;
+            render_surface_at(sum->surface, ((double)number + random_of(seed, number)) / point_count,
+                              &point);
+            *sample = (struct sample){ .object = point.object };
+            for (int k = 0; k < 3; k++)
+                sample->position_mm[k] = point.position_mm[k];
+            if (profile_of(sum, point.object))
+                light_point(sum, &point, area_mm2, sample->flux_w);
+        }
     }
 }
 
-/* Leave out the empty slots. */
-static void close_ranks(struct samples *samples, size_t slot_count)
+static bool is_lit(const struct sample *sample)
 {
-    samples->count = 0;
-    for (size_t i = 0; i < slot_count; i++) {
-        const double flux_w[] = { samples->flux_w[0][i], samples->flux_w[1][i], samples->flux_w[2][i] };
-        if (!(brightness(flux_w) > 0))
+    return sample->flux_w[0] + sample->flux_w[1] + sample->flux_w[2] > 0;
+}
+
+static struct entry *entry_of(struct render_sum *sum, size_t sample)
+{
+    const bool is_second = sample >= sum->count && !sum->pass.is_joined;
+    return &sum->entries[is_second ? 1 : 0][sum->samples[sample].object];
+}
+
+/* Leave out what is dark, and put together what enters the same object. */
+static bool sort_samples(struct render_sum *sum, dipole_status *status)
+{
+    size_t lit_count = 0;
+    for (size_t i = 0; i < 2 * sum->count; i++) {
+        if (is_lit(&sum->samples[i])) {
+            entry_of(sum, i)->count++;
+            lit_count++;
+        }
+    }
+    sum->points = aligned_alloc(sizeof(render_lanes), (lit_count + 1) * sizeof *sum->points);
+    if (!sum->points)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu samples", lit_count);
+    struct render_tree_point *next = sum->points;
+    for (int half = 0; half < 2; half++) {
+        for (size_t i = 0; i < sum->view->scene->object_count; i++) {
+            sum->entries[half][i].points = next;
+            next += sum->entries[half][i].count;
+            sum->entries[half][i].count = 0;
+        }
+    }
+    for (size_t i = 0; i < 2 * sum->count; i++) {
+        const struct sample *const sample = &sum->samples[i];
+        if (!is_lit(sample))
             continue;
-        for (int k = 0; k < 3; k++)
-            samples->position_mm[k][samples->count] = samples->position_mm[k][i];
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            samples->flux_w[c][samples->count] = flux_w[c];
-        samples->count++;
+        struct entry *const entry = entry_of(sum, i);
+        struct render_tree_point *const point = &entry->points[entry->count++];
+        *point = (struct render_tree_point){ .unused = 0 };
+        for (int k = 0; k < 3; k++) {
+            point->position_mm[k] = sample->position_mm[k];
+            point->flux_w[k] = sample->flux_w[k];
+        }
     }
+    free(sum->samples);
+    sum->samples = NULL;
+    return true;
 }
 
-void render_sum_take(struct render_sum *sum, size_t cell_count, size_t first, size_t count)
+static void plant(void *context, int index)
 {
-    sum->cell_count = cell_count;
+    struct render_sum *const sum = context;
+    const size_t object_count = sum->view->scene->object_count, i = (size_t)index;
+    struct entry *const entry = &sum->entries[i / object_count][i % object_count];
+    sum->statuses[i] = (dipole_status){ .code = DIPOLE_OK };
+    if (entry->count > 0 &&
+        !render_tree_create(entry->points, entry->count, &entry->tree, &sum->statuses[i]))
+        entry->tree = NULL; /* its status says so */
+}
+
+bool render_sum_take(struct render_sum *sum, const struct render_sum_pass *pass, size_t first, size_t count,
+                     dipole_status *status)
+{
+    const size_t object_count = sum->view->scene->object_count;
+    forget_chunk(sum);
+    sum->pass = *pass;
     sum->first = first;
     sum->count = count;
-    lut_parallel_for((int)((count + PART_CELLS - 1) / PART_CELLS), sum->thread_count, take_part, sum);
-    for (int half = 0; half < 2; half++)
-        close_ranks(&sum->samples[half], count * POINTS);
+    sum->samples = malloc(2 * count * sizeof *sum->samples);
+    if (!sum->samples)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu samples", 2 * count);
+    for (size_t i = 0; i < sum->media->count; i++) {
+        if (sum->profiles[i])
+            render_profile_set_core(sum->profiles[i], &sum->media->media[i],
+                                    CORE_SPACINGS * spacing_mm(sum, (double)pass->point_count));
+    }
+    lut_parallel_for((int)((count + PART_POINTS - 1) / PART_POINTS), sum->thread_count, take_part, sum);
+    if (!sort_samples(sum, status))
+        return false;
+    lut_parallel_for((int)(2 * object_count), sum->thread_count, plant, sum);
+    for (size_t i = 0; i < 2 * object_count; i++) {
+        if (sum->statuses[i].code != DIPOLE_OK)
+            return dipole_fail(status, sum->statuses[i].code, NULL, "%s", sum->statuses[i].message);
+    }
+    return true;
 }
 
 /* ---- sums --------------------------------------------------------------------------------------- */
 
-/* Add scale times the radiosity at a point. */
-static void add_samples(const struct render_sum *sum, const struct samples *samples,
-                        const double position_mm[3], double scale, double radiance[3])
+/* Radiosity hardly differs within a group of a pixel's points: that of its middle does for all. */
+struct group {
+    double middle_mm[3], exit_per_sr;
+    size_t object, pixel;
+};
+
+struct tile {
+    struct group groups[TILE_GROUPS];
+    size_t count;
+};
+
+static void see_pixel(const struct render_sum *sum, int x, int y, struct tile *tile)
 {
-    double r_mm[BATCH], profiles[IO_CHANNEL_COUNT][BATCH];
-    for (size_t at = 0; at < samples->count; at += BATCH) {
-        const size_t rest = samples->count - at, count = rest < BATCH ? rest : BATCH;
-        const double *const x = samples->position_mm[0] + at, *const y = samples->position_mm[1] + at,
-                            *const z = samples->position_mm[2] + at;
-        for (size_t i = 0; i < count; i++) {
-            const double dx = x[i] - position_mm[0], dy = y[i] - position_mm[1], dz = z[i] - position_mm[2];
-            r_mm[i] = sqrt(dx * dx + dy * dy + dz * dz);
+    struct render_pixel pixel;
+    render_pixel_trace(sum->view, x, y, &pixel);
+    for (int g = 0; g < pixel.group_count; g++) {
+        const struct render_pixel_group *const seen = &pixel.groups[g];
+        struct group *const group = &tile->groups[tile->count++];
+        *group = (struct group){ .object = seen->points[0].object,
+                                 .pixel = (size_t)y * (size_t)sum->view->width_px + (size_t)x };
+        for (int i = 0; i < seen->count; i++) {
+            group->exit_per_sr += render_pixel_exit_per_sr(sum->view, &seen->points[i]) / RENDER_PIXEL_RAYS;
+            for (int k = 0; k < 3; k++)
+                group->middle_mm[k] += seen->points[i].position_mm[k] / seen->count;
         }
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-            if (sum->twins[c] < 0)
+    }
+}
+
+static bool is_near(const struct render_sum *sum, const struct group *a, const struct group *b)
+{
+    const double limit_mm = TILE_SHARE * sum->view->media[a->object].group_mm;
+    double square = 0;
+    for (int k = 0; k < 3; k++)
+        square += (a->middle_mm[k] - b->middle_mm[k]) * (a->middle_mm[k] - b->middle_mm[k]);
+    return a->object == b->object && square <= limit_mm * limit_mm;
+}
+
+static void add_targets(const struct render_sum *sum, const struct group *groups,
+                        struct render_tree_targets *targets)
+{
+    const size_t object = groups->object;
+    const double chunk_count = ceil((double)sum->pass.point_count / RENDER_SUM_CHUNK);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        targets->least[c] = sum->pass.least[c] / sum->view->media[object].exit_scale_per_sr / chunk_count;
+    for (int half = 0; half < 2; half++) {
+        const struct render_tree *const tree = sum->entries[half][object].tree;
+        if (!tree)
+            continue;
+        for (int i = 0; i < targets->count; i++)
+            targets->sums[i] = (render_lanes){ 0 };
+        render_tree_add(tree, profile_of(sum, object), targets);
+        for (int i = 0; i < targets->count; i++) {
+            for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+                sum->halves[half][3 * groups[i].pixel + (size_t)c] +=
+                    groups[i].exit_per_sr * targets->sums[i][c];
+        }
+    }
+}
+
+/* Sum for groups that are near each other, together. */
+static void add_tile(const struct render_sum *sum, struct tile *tile)
+{
+    while (tile->count > 0) {
+        struct group taken[RENDER_TREE_TARGETS] = { { .object = 0 } };
+        struct render_tree_targets targets = { .count = 0 };
+        const struct group first = tile->groups[0];
+        size_t left = 0;
+        for (size_t i = 0; i < tile->count; i++) {
+            const struct group *const group = &tile->groups[i];
+            if (targets.count == RENDER_TREE_TARGETS || !is_near(sum, &first, group)) {
+                tile->groups[left++] = *group;
                 continue;
-            if (sum->twins[c] == c)
-                dipole_rd_profile_per_mm2(&sum->view->plan->coefficients[c], r_mm, count, profiles[c]);
-            const double *const profile = profiles[sum->twins[c]], *const flux_w = samples->flux_w[c] + at;
-            double batch = 0;
-            for (size_t i = 0; i < count; i++)
-                batch += flux_w[i] * profile[i];
-            radiance[c] += scale * batch;
+            }
+            for (int k = 0; k < 3; k++)
+                targets.position_mm[targets.count][k] = group->middle_mm[k];
+            taken[targets.count++] = *group;
         }
+        tile->count = left;
+        add_targets(sum, taken, &targets);
     }
 }
 
-/* Radiosity hardly differs within a group: that of its middle does for all its points. */
-static void add_group(const struct render_sum *sum, const struct samples *samples,
-                      const struct render_pixel_group *group, double radiance[3])
+static int tiles_along(const struct render_sum_pass *pass, int side_px)
 {
-    double middle_mm[3] = { 0 }, scale = 0;
-    for (int i = 0; i < group->count; i++) {
-        scale += render_pixel_exit_per_sr(sum->view, &group->points[i]) / RENDER_PIXEL_RAYS;
-        for (int k = 0; k < 3; k++)
-            middle_mm[k] += group->points[i].position_mm[k] / group->count;
-    }
-    add_samples(sum, samples, middle_mm, scale, radiance);
+    const int tile_px = pass->step_px > 1 ? pass->step_px : TILE_PX;
+    return (side_px + tile_px - 1) / tile_px;
 }
 
-static void add_row(void *context, int row)
+static void add_tile_number(void *context, int index)
 {
     const struct render_sum *const sum = context;
-    const int width_px = sum->view->plan->width_px, y = sum->first_row + row;
-    struct render_pixel pixel;
-    for (int x = 0; x < width_px; x++) {
-        render_pixel_trace(sum->view, x, y, &pixel);
-        for (int half = 0; half < 2; half++) {
-            double *const radiance = sum->halves[half] + 3 * ((size_t)y * (size_t)width_px + (size_t)x);
-            for (int g = 0; g < pixel.group_count; g++)
-                add_group(sum, &sum->samples[half], &pixel.groups[g], radiance);
-        }
+    const int step_px = sum->pass.step_px, tile_px = step_px > 1 ? step_px : TILE_PX;
+    const int across = tiles_along(&sum->pass, sum->view->width_px);
+    const int x0 = index % across * tile_px, y0 = (sum->first_band + index / across) * tile_px;
+    struct tile tile = { .count = 0 };
+    for (int y = y0 + step_px / 2; y < y0 + tile_px && y < sum->view->height_px; y += step_px) {
+        for (int x = x0 + step_px / 2; x < x0 + tile_px && x < sum->view->width_px; x += step_px)
+            see_pixel(sum, x, y, &tile);
     }
+    add_tile(sum, &tile);
 }
 
-void render_sum_add_rows(struct render_sum *sum, int first_row, int row_count, double *const halves[2])
+int render_sum_band_count(const struct render_sum *sum, const struct render_sum_pass *pass)
 {
-    sum->first_row = first_row;
+    return tiles_along(pass, sum->view->height_px);
+}
+
+void render_sum_add_bands(struct render_sum *sum, const struct render_sum_pass *pass, int first, int count,
+                          double *const halves[2])
+{
+    sum->pass = *pass;
+    sum->first_band = first;
     sum->halves = halves;
-    lut_parallel_for(row_count, sum->thread_count, add_row, sum);
+    lut_parallel_for(count * tiles_along(pass, sum->view->width_px), sum->thread_count, add_tile_number,
+                     sum);
 }

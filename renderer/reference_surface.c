@@ -144,6 +144,16 @@ static void order_pieces(struct piece *pieces, size_t count, int depth)
     order_pieces(pieces + half, count - half, depth + 1);
 }
 
+/* One object after the other, as they are listed. */
+static void order_objects(struct piece *pieces, size_t count)
+{
+    for (size_t begin = 0, end = 0; begin < count; begin = end) {
+        while (end < count && pieces[end].object == pieces[begin].object)
+            end++;
+        order_pieces(pieces + begin, end - begin, 0);
+    }
+}
+
 static size_t list_pieces(const struct io_scene *scene, struct piece *pieces)
 {
     size_t count = 0;
@@ -188,7 +198,7 @@ bool render_surface_create(const struct io_scene *scene, struct render_surface *
     const bool done = surface && pieces && surface->places && surface->ends_mm2;
     if (done) {
         surface->count = list_pieces(scene, pieces);
-        order_pieces(pieces, surface->count, 0);
+        order_objects(pieces, surface->count);
         double end_mm2 = 0;
         for (size_t i = 0; i < surface->count; i++) {
             end_mm2 += pieces[i].area_mm2;

@@ -1,7 +1,7 @@
 /*
- * The surface of a whole scene as one line of length 1: equal lengths are equal areas, and what is near on
- * the line is near in space. Points spread evenly over the line then are spread evenly over the surface.
- * theory.md T33.
+ * The surface of a whole scene as one line of length 1, one object after the other: equal lengths are equal
+ * areas, and what is near on the line is near in space. Points spread evenly over the line then are spread
+ * evenly over the surface. theory.md T33.
  */
 #ifndef RENDERER_REFERENCE_SURFACE_H
 #define RENDERER_REFERENCE_SURFACE_H

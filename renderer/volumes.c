@@ -17,7 +17,7 @@ static struct render_volumes *volumes_create(const struct render_media *media, d
     struct render_volumes *const volumes = calloc(1, sizeof *volumes);
     if (volumes) {
         volumes->count = media->count;
-        volumes->volumes = calloc(media->count, sizeof *volumes->volumes);
+        volumes->volumes = calloc(media->count, sizeof(void *));
     }
     if (volumes && volumes->volumes)
         return volumes;

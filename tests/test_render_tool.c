@@ -70,7 +70,7 @@ static int setup(void **state)
 /* The command ends with that code and exactly that line on stderr, and leaves no picture. */
 static void fails_with(const char *command, int code, const char *message)
 {
-    char out[4096], err[4096];
+    char out[32768], err[32768];
     const int found = run(command, out, err, sizeof out);
     if (found != code || strcmp(err, message) != 0)
         print_error("%s\n  exit %d, stderr: %s", command, found, err);
@@ -150,7 +150,7 @@ static void every_model_is_drawn(void **state)
         "\"material\":\n"
         "      { \"name\": \"b\", \"eta\": 1.3, \"model\": \"beam\", \"sigma_a_per_mm\": [1, 1, 1], "
         "\"sigma_s_prime_per_mm\": [1, 1, 1] } }] }\n");
-    char out[4096], err[4096];
+    char out[32768], err[32768];
     assert_int_equal(run(RENDER " models.json -o models.exr --explain", out, err, sizeof err), 0);
     assert_non_null(strstr(out, "object_ids "));
     assert_non_null(strstr(out, "objects of different media"));
@@ -161,8 +161,8 @@ static void wrong_usage_is_code_2(void **state)
 {
     (void)state;
     fails_with(RENDER " sphere.json", 2, "render: no --output (-o) IMG was given; try --help\n");
-    fails_with(RENDER " sphere.json -o bad.exr --technique tsm", 2,
-               "render: --technique is \"tsm\", expected one of auto, splat, lambert, reference\n");
+    fails_with(RENDER " sphere.json -o bad.exr --technique magic", 2,
+               "render: --technique is \"magic\", expected one of auto, splat, lambert, reference, tsm\n");
     fails_with(RENDER " sphere.json -o bad.exr --context glx", 2,
                "render: --context is \"glx\", expected one of osmesa, egl, window\n");
     fails_with(RENDER " turn.json -o bad.exr --frames 2:1", 2,
@@ -170,10 +170,32 @@ static void wrong_usage_is_code_2(void **state)
     fails_with(RENDER " turn.json -o bad.exr --frames=-1", 2,
                "render: --frames is \"-1\", expected FIRST:LAST or one number, each 0 to 99999\n");
     fails_with(RENDER " turn.json --view --frames 0:1", 2, "render: --view cannot be used with --frames\n");
-    char out[4096], err[4096];
+    char out[32768], err[32768];
     assert_int_equal(run(RENDER " sphere.json -o bad.exr --epsilon 0", out, err, sizeof out), 2);
     assert_int_equal(run(RENDER " sphere.json -o bad.exr --budget-ms 5", out, err, sizeof out), 2);
     assert_int_equal(run(RENDER " -o bad.exr", out, err, sizeof out), 2);
+}
+
+/* Oracle: exit codes and messages. Options of shadow maps are taken together, and refused where they
+ * contradict. */
+static void shadow_maps_take_their_options(void **state)
+{
+    (void)state;
+    char out[32768], err[32768];
+    assert_int_equal(run(RENDER " sphere.json -t tsm --tsm vertex --tsm-response exact --tsm-part global "
+                                "--tsm-samples 13 --peel 4 --explain -o good.exr",
+                         out, err, sizeof out),
+                     0);
+    assert_string_equal(err, "");
+    assert_non_null(strstr(out, "error not bounded; of the table 0\n"));
+    assert_non_null(strstr(out, "4 layers are asked for"));
+    assert_int_equal(unlink("good.exr"), 0);
+    fails_with(
+        RENDER " sphere.json -t tsm --tsm-response texels --peel 2 -o bad.exr", 1,
+        "render: response \"texels\" sums all texels at each fragment: it has no parts, no vertices and no "
+        "layers\n");
+    fails_with(RENDER " sphere.json -t tsm --peel 3 -o bad.exr", 2,
+               "render: --peel is \"3\", expected one of 0, 2, 4, 6, 8, 10, 12, 14, 16\n");
 }
 
 /* Oracle: the environment, made unfit for each backend: every one tried is named with its reason. */
@@ -192,7 +214,7 @@ static void a_missing_context_names_what_was_tried(void **state)
 static void results_are_told_as_promised(void **state)
 {
     (void)state;
-    char out[16384], err[4096];
+    char out[32768], err[32768];
     assert_int_equal(run(RENDER " sphere.json -o a.exr --json --epsilon 0.02", out, err, sizeof err), 0);
     assert_string_equal(err, "");
     json_t *const result = json_loads(out, 0, NULL);
@@ -224,7 +246,8 @@ static void results_are_told_as_promised(void **state)
     assert_int_equal(
         run(RENDER " sphere.json -o b.exr --explain --size 32x24 -t lambert", out, err, sizeof err), 0);
     assert_non_null(strstr(out, "technique lambert, epsilon 0.01\n"));
-    assert_non_null(strstr(out, "splat             no            0.0        0.0         0  technique is lambert\n"));
+    assert_non_null(
+        strstr(out, "splat             no            0.0        0.0         0  technique is lambert\n"));
     assert_non_null(strstr(out, "b.exr: lambert, epsilon 0.01, "));
 }
 
@@ -242,7 +265,7 @@ static void frames_are_numbered_pictures(void **state)
 {
     (void)state;
     static const char *const techniques[] = { "lambert", "reference --epsilon 0.1 --size 16x12" };
-    char command[1024], out[16384], err[4096];
+    char command[1024], out[32768], err[32768];
     for (size_t i = 0; i < 2; i++) {
         snprintf(command, sizeof command,
                  "rm -f *.exr; " RENDER " turn.json -o f.exr -t %s --frames 0:2 && " RENDER
@@ -263,7 +286,7 @@ static void frames_are_numbered_pictures(void **state)
 static void frames_are_told_as_promised(void **state)
 {
     (void)state;
-    char out[16384], err[4096];
+    char out[32768], err[32768];
     for (int last = 1; last < 3; last++) {
         char command[512];
         snprintf(command, sizeof command, RENDER " turn.json -o ./a.b.png -t lambert --json --frames 1:%d",
@@ -301,7 +324,7 @@ static void frames_are_told_as_promised(void **state)
 static void the_png_is_the_tone_mapped_exr(void **state)
 {
     (void)state;
-    char out[4096], err[4096];
+    char out[32768], err[32768];
     assert_int_equal(
         run(RENDER " sphere.json -o a.exr && " RENDER " sphere.json -o a.png", out, err, sizeof out), 0);
     struct io_image *const linear = read_exr("a.exr");
@@ -329,7 +352,7 @@ static void the_png_is_the_tone_mapped_exr(void **state)
 static void tables_on_disk_are_found_by_their_medium(void **state)
 {
     (void)state;
-    char out[4096], err[4096];
+    char out[32768], err[32768];
     write_file("skin1.json", "{ \"name\": \"Skin 1\", \"eta\": 1.3, \"sigma_a_per_mm\": [0.1, 0.2, 0.3],\n"
                              "  \"sigma_s_prime_per_mm\": [1, 1, 1] }\n");
     assert_int_equal(mkdir("empty", 0777), 0);
@@ -361,7 +384,7 @@ static void tables_on_disk_are_found_by_their_medium(void **state)
 static void all_contexts_give_the_same_picture(void **state)
 {
     (void)state;
-    char out[4096], err[4096];
+    char out[32768], err[32768];
     assert_int_equal(run(RENDER " sphere.json -o osmesa.exr --context osmesa && " RENDER
                                 " sphere.json -o egl.exr --context egl",
                          out, err, sizeof out),
@@ -388,6 +411,7 @@ int main(void)
         cmocka_unit_test_setup(bad_input_is_one_line_and_no_picture, setup),
         cmocka_unit_test_setup(every_model_is_drawn, setup),
         cmocka_unit_test_setup(wrong_usage_is_code_2, setup),
+        cmocka_unit_test_setup(shadow_maps_take_their_options, setup),
         cmocka_unit_test_setup(a_missing_context_names_what_was_tried, setup),
         cmocka_unit_test_setup(results_are_told_as_promised, setup),
         cmocka_unit_test_setup(frames_are_numbered_pictures, setup),
