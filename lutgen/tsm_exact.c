@@ -56,8 +56,8 @@ bool lut_tsm_exact_create(const struct lut_tsm *lut, int node_count, struct lut_
     *exact_out = NULL;
     struct lut_tsm_exact *const exact = calloc(1, sizeof *exact);
     if (exact)
-        exact->rgb = calloc((size_t)lut->sample_count * (size_t)node_count,
-                            IO_CHANNEL_COUNT * sizeof *exact->rgb);
+        exact->rgb =
+            calloc((size_t)lut->sample_count * (size_t)node_count, IO_CHANNEL_COUNT * sizeof *exact->rgb);
     bool is_done = exact && exact->rgb;
     if (!is_done)
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for the response of %d samples",

@@ -447,7 +447,7 @@ static bool attach_targets(const struct render_frame *frame, const struct render
     for (size_t w = 0; writes[w]; w++) {
         struct texture *const target = texture_find(frame->executor, writes[w]);
         float value[4] = { 0, 0, 0, 0 };
-        if (target->kind->is_far_where_empty)
+        if (target->kind->is_far_where_empty && frame->view)
             far_point(frame->view, value);
         if (target->kind->format != RENDER_OTHER && (!pass->is_added || !target->is_written))
             glClearNamedFramebufferfv(framebuffer, GL_COLOR, (GLint)w, value);
