@@ -248,7 +248,7 @@ static void the_error_budget_is_kept(void **state)
             alias = fmax(alias,
                          4 * dipole_spectrum(&k, 2 * acos(-1) / plan->spacing_mm) / dipole_spectrum(&k, 0));
         }
-        assert_close(tail, 0.1 * epsilons[i], 1e-6, "tail at epsilon %g", epsilons[i]);
+        assert_close(tail, 0.02 * epsilons[i], 1e-6, "tail at epsilon %g", epsilons[i]);
         assert_true(alias <= 0.58 * epsilons[i] * (1 + 1e-6));
         if (plan->note_count == 0)
             assert_true(plan->error_predicted <= epsilons[i] * (1 + 1e-6));

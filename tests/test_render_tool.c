@@ -361,8 +361,8 @@ static void tables_on_disk_are_found_by_their_medium(void **state)
                          "/lutgen skin1.json -o others",
                          out, err, sizeof out),
                      0);
-    assert_int_equal(run(RENDER " sphere.json -o memory.exr && " RENDER
-                                " sphere.json -o disk.exr --luts tables",
+    assert_int_equal(run(RENDER " sphere.json -o memory.exr -e 0.05 && " RENDER
+                                " sphere.json -o disk.exr -e 0.05 --luts tables",
                          out, err, sizeof out),
                      0);
     assert_string_equal(err, "");
