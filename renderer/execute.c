@@ -466,7 +466,8 @@ static void set_state(const struct render_frame *frame, const struct render_pass
     const bool is_map = target->size == RENDER_SIZE_MAP;
     int width_px, height_px;
     texture_size(frame->plan, target, &width_px, &height_px);
-    if (is_map || target->size == RENDER_SIZE_LIGHT_VIEW) /* a part of a texture for the largest */
+    if (frame->view &&
+        (is_map || target->size == RENDER_SIZE_LIGHT_VIEW)) /* a part of a texture for the largest */
         width_px = height_px = frame->view->size_px;
     glViewport(0, 0, width_px, height_px);
     /* What stands between the light and the object that a map is fitted to is in front of its near plane.
