@@ -108,6 +108,7 @@ static size_t point_views(const struct io_scene *scene, const struct render_plan
         return 1;
     }
     view.is_cube_face = true;
+    view.projection.near_mm *= 0.577; /* the corner of a face is sqrt(3) times as far away as it is deep */
     view.projection.half_width = view.projection.half_height = 1;
     choose_view_size(plan, 2 * view.projection.far_mm, &view);
     view.levels = LEVELS_LIMIT; /* the surface may be as near as it likes */
