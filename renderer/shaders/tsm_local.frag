@@ -1,5 +1,5 @@
 // Pass tsm_local: radiosity += the response to 7 x 7 cells about each fragment, of which the five inner samples of
-// the pattern leave to it what lies about as deep (theory.md T32, T36).
+// the pattern leave to it what lies about as deep (theory.md T32, T37).
 #include "common/tsm_map.glsl"
 #include "common/tsm_form.glsl"
 uniform sampler2D position_mm;
