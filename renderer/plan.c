@@ -141,8 +141,8 @@ static bool take_media(const struct render_request *request, struct render_plan 
             !render_plan_check_table(&request->tables[m], plan->media->media[m].material, NULL, status))
             return false;
     }
-    plan->objects = calloc(scene->object_count, sizeof *plan->objects);
-    plan->of_medium = calloc(plan->media->count, sizeof *plan->of_medium);
+    plan->objects = calloc(scene->object_count + 1, sizeof *plan->objects);
+    plan->of_medium = calloc(plan->media->count + 1, sizeof *plan->of_medium);
     return (plan->objects && plan->of_medium) ||
            dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to plan %zu objects",
                        scene->object_count);
