@@ -20,6 +20,9 @@
 #define RENDER_COST_SHADOW_PIXEL 150.0   /* lit and shaded at one point                  */
 #define RENDER_COST_COMPOSITE_PIXEL 80.0 /* covered                                      */
 #define RENDER_COST_SPLAT_EVALUATION 6.0 /* one sample at one pixel                      */
+#define RENDER_COST_MAP_TEXEL 120.0      /* of a translucent shadow map: drawn, levels made  */
+#define RENDER_COST_MAP_SAMPLE 90.0      /* one sample of a map at one point             */
+#define RENDER_COST_MAP_EVALUATION 20.0  /* one texel of a map at one pixel              */
 #define RENDER_COST_SCREEN_PIXEL 6.0     /* touched by a simple pass                     */
 
 static inline double render_cost_ms(double ns_each, double count)
@@ -38,6 +41,23 @@ static inline double render_cost_view_texels(const struct render_plan *plan)
     double count = 0;
     for (size_t i = 0; i < plan->view_count; i++)
         count += (double)plan->views[i].size_px * plan->views[i].size_px;
+    return count;
+}
+
+/* Texels of all translucent shadow maps; and pixels that gather from them, of each map its object's. */
+static inline double render_cost_map_texels(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->map_count; i++)
+        count += (double)plan->maps[i].size_px * plan->maps[i].size_px;
+    return count;
+}
+
+static inline double render_cost_map_pixels(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->map_count; i++)
+        count += plan->objects[plan->maps[i].object].pixel_count;
     return count;
 }
 

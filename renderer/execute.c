@@ -1,6 +1,7 @@
 #include "renderer/execute.h"
 
 #include "renderer/splat_draw.h"
+#include "renderer/tsm_draw.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -10,8 +11,8 @@
 
 enum {
     SAMPLES_PER_PIXEL = 4,
-    PROGRAM_LIMIT = 32,
-    TEXTURE_LIMIT = 24,
+    PROGRAM_LIMIT = 64,
+    TEXTURE_LIMIT = 48,
     DEFINES_SIZE = 256,
 };
 
@@ -35,7 +36,8 @@ struct texture {
 struct mesh {
     GLuint vertex_array, buffers[3];
     GLsizei index_count;
-    double roughness; /* 0: no gloss */
+    size_t first_vertex; /* counted over all meshes */
+    double roughness;    /* 0: no gloss */
 };
 
 struct render_executor {
@@ -49,6 +51,7 @@ struct render_executor {
     size_t texture_count;
     size_t draw_counts[RENDER_EFFECT_LIMIT];
     struct render_splatter *splatter;           /* NULL until light is first sampled */
+    struct render_tsm *tsm;                     /* NULL until a shadow map is first gathered */
     struct render_buffer_texture object_buffer; /* of render_executor_fill_media     */
 };
 
@@ -105,8 +108,12 @@ bool render_executor_create(const struct io_scene *scene, struct render_gl_error
     executor->errors = errors;
     executor->meshes = meshes;
     executor->mesh_count = scene->object_count;
-    for (size_t i = 0; i < scene->object_count; i++)
+    size_t vertex_count = 0;
+    for (size_t i = 0; i < scene->object_count; i++) {
         mesh_create(&meshes[i], &scene->objects[i]);
+        meshes[i].first_vertex = vertex_count;
+        vertex_count += scene->objects[i].mesh->vertex_count;
+    }
     glCreateVertexArrays(1, &executor->empty_vertex_array);
     if (!render_gl_check(errors, "upload of the meshes", status)) {
         render_executor_destroy(executor);
@@ -129,6 +136,7 @@ void render_executor_destroy(struct render_executor *executor)
     for (size_t i = 0; i < executor->texture_count; i++)
         texture_end(&executor->textures[i]);
     render_splatter_destroy(executor->splatter);
+    render_tsm_destroy(executor->tsm);
     render_buffer_texture_destroy(&executor->object_buffer);
     glDeleteVertexArrays(1, &executor->empty_vertex_array);
     free(executor->meshes);
@@ -220,6 +228,11 @@ static void texture_size(const struct render_plan *plan, const struct render_tex
         for (size_t v = 0; v < plan->view_count; v++)
             largest = plan->views[v].size_px > largest ? plan->views[v].size_px : largest;
         *width_px = *height_px = largest;
+    } else if (kind->size == RENDER_SIZE_MAP) {
+        *width_px = *height_px = render_plan_map_side_px(plan);
+    } else if (kind->size == RENDER_SIZE_VERTICES) {
+        *width_px = RENDER_VERTEX_ROW;
+        *height_px = (int)((plan->vertex_count + RENDER_VERTEX_ROW - 1) / RENDER_VERTEX_ROW);
     }
 }
 
@@ -258,8 +271,13 @@ static bool texture_want(struct render_executor *executor, const struct render_p
         const int levels = kind->is_mipmapped ? (int)log2(largest_px) + 1 : 1;
         glTextureStorage2D(texture->handle, levels, format, width_px, height_px);
         glTextureParameteri(texture->handle, GL_TEXTURE_MIN_FILTER,
-                            kind->is_mipmapped ? GL_NEAREST_MIPMAP_NEAREST : GL_NEAREST);
-        glTextureParameteri(texture->handle, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+                            kind->is_mipmapped ? GL_LINEAR_MIPMAP_LINEAR : GL_NEAREST);
+        glTextureParameteri(texture->handle, GL_TEXTURE_MAG_FILTER,
+                            kind->is_mipmapped ? GL_LINEAR : GL_NEAREST);
+        if (kind->is_mipmapped) { /* 0 outside */
+            glTextureParameteri(texture->handle, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+            glTextureParameteri(texture->handle, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+        }
     }
     glObjectLabel(GL_TEXTURE, texture->handle, -1, name);
     texture->width_px = width_px;
@@ -315,6 +333,21 @@ bool render_executor_need_splatter(const struct render_frame *frame, struct rend
         return false;
     *splatter_out = executor->splatter;
     return true;
+}
+
+bool render_executor_need_tsm(const struct render_frame *frame, struct render_tsm **tsm_out,
+                              dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    if (!executor->tsm && !render_tsm_create(frame->plan->media, &executor->tsm, status))
+        return false;
+    *tsm_out = executor->tsm;
+    return true;
+}
+
+struct render_tsm *render_executor_tsm(const struct render_executor *executor)
+{
+    return executor->tsm;
 }
 
 struct render_splatter *render_executor_splatter(const struct render_executor *executor)
@@ -399,7 +432,8 @@ static bool attach_targets(const struct render_frame *frame, const struct render
     for (size_t w = 0; writes[w]; w++) {
         struct texture *const target = texture_find(frame->executor, writes[w]);
         const GLenum attachment = GL_COLOR_ATTACHMENT0 + (GLenum)w;
-        glNamedFramebufferTexture(framebuffer, attachment, target->handle, 0);
+        if (target->kind->format != RENDER_OTHER) /* else the pass attaches it by itself */
+            glNamedFramebufferTexture(framebuffer, attachment, target->handle, 0);
         buffers[buffer_count++] = attachment;
     }
     const char *const depth_name = pass->depth_written ? pass->depth_written : pass->depth_tested;
@@ -413,9 +447,9 @@ static bool attach_targets(const struct render_frame *frame, const struct render
     for (size_t w = 0; writes[w]; w++) {
         struct texture *const target = texture_find(frame->executor, writes[w]);
         float value[4] = { 0, 0, 0, 0 };
-        if (target->kind->is_far_where_empty)
+        if (target->kind->is_far_where_empty && frame->view)
             far_point(frame->view, value);
-        if (!pass->is_added || !target->is_written)
+        if (target->kind->format != RENDER_OTHER && (!pass->is_added || !target->is_written))
             glClearNamedFramebufferfv(framebuffer, GL_COLOR, (GLint)w, value);
         target->is_written = true;
     }
@@ -429,9 +463,16 @@ static bool attach_targets(const struct render_frame *frame, const struct render
 static void set_state(const struct render_frame *frame, const struct render_pass *pass)
 {
     const struct render_texture *const target = render_texture_find(pass->writes[0]);
-    const bool is_light_view = target->size == RENDER_SIZE_LIGHT_VIEW;
-    glViewport(0, 0, is_light_view ? frame->view->size_px : frame->plan->width_px,
-               is_light_view ? frame->view->size_px : frame->plan->height_px);
+    const bool is_map = target->size == RENDER_SIZE_MAP;
+    int width_px, height_px;
+    texture_size(frame->plan, target, &width_px, &height_px);
+    if (frame->view &&
+        (is_map || target->size == RENDER_SIZE_LIGHT_VIEW)) /* a part of a texture for the largest */
+        width_px = height_px = frame->view->size_px;
+    glViewport(0, 0, width_px, height_px);
+    /* What stands between the light and the object that a map is fitted to is in front of its near plane.
+     */
+    (is_map ? glEnable : glDisable)(GL_DEPTH_CLAMP);
     (pass->is_added || pass->is_blended ? glEnable : glDisable)(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     (pass->depth_written || pass->depth_tested ? glEnable : glDisable)(GL_DEPTH_TEST);
@@ -447,6 +488,7 @@ void render_draw_object(const struct render_frame *frame, size_t object)
     const struct render_medium *const medium = &plan->media->media[plan->objects[object].medium];
     render_set_float(frame->program, "roughness", mesh->roughness);
     render_set_float(frame->program, "object", (double)(object + 1));
+    render_set_int(frame->program, "first_vertex", (int)mesh->first_vertex);
     render_set_float(frame->program, "object_eta", medium->eta);
     glBindVertexArray(mesh->vertex_array);
     glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
@@ -519,7 +561,8 @@ static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
 
 bool render_executor_run(struct render_executor *executor, const struct render_request *request,
                          const struct render_plan *plan, const struct render_table *tables,
-                         double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
+                         const struct lut_tsm *const *volumes, double time_ms[RENDER_EFFECT_LIMIT],
+                         dipole_status *status)
 {
     memset(time_ms, 0, RENDER_EFFECT_LIMIT * sizeof *time_ms);
     memset(executor->draw_counts, 0, sizeof executor->draw_counts);
@@ -530,11 +573,16 @@ bool render_executor_run(struct render_executor *executor, const struct render_r
     bool done = true;
     for (size_t i = 0; done && i < plan->pass_count; i++) {
         const struct render_plan_pass *const row = &plan->passes[i];
-        struct render_frame frame = {
-            .executor = executor, .request = request, .plan = plan, .tables = tables, .effect = row->effect
-        };
+        struct render_frame frame = { .executor = executor,
+                                      .request = request,
+                                      .plan = plan,
+                                      .tables = tables,
+                                      .volumes = volumes,
+                                      .effect = row->effect };
         if (row->pass->is_per_view)
             frame.view = &plan->views[row->view];
+        if (row->pass->is_per_map)
+            frame.view = &plan->maps[row->view];
         const double start_ms = now_ms();
         done = run_pass(&frame, row->pass, status);
         time_ms[row->effect] += now_ms() - start_ms;

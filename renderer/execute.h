@@ -7,16 +7,18 @@
 
 struct render_executor;
 struct render_splatter;
+struct render_tsm;
 
 /* What a pass sees when its bind or run function is called. */
 struct render_frame {
     struct render_executor *executor;
     const struct render_request *request;
     const struct render_plan *plan;
-    const struct render_table *tables;   /* of each medium, when the plan splats */
-    const struct render_plan_view *view; /* of passes per view, else NULL        */
-    size_t effect;                       /* that the pass is of                  */
-    GLuint program;                      /* 0 when nothing is drawn              */
+    const struct render_table *tables;    /* of each medium, when the plan splats */
+    const struct lut_tsm *const *volumes; /* of each medium, when the plan has maps */
+    const struct render_plan_view *view;  /* of passes per view or map, else NULL */
+    size_t effect;                        /* that the pass is of                  */
+    GLuint program;                       /* 0 when nothing is drawn              */
 };
 
 /* Takes the scene's meshes to the context. End it with render_executor_destroy, context current. */
@@ -26,11 +28,13 @@ void render_executor_destroy(struct render_executor *executor);
 
 /*
  * Run the passes in order; time_ms[e] of each effect of the plan is set. tables: one for each medium,
- * needed when the plan splats, else NULL. Fails with DIPOLE_NOT_SUPPORTED or DIPOLE_OUT_OF_MEMORY.
+ * needed when the plan splats, else NULL; volumes: the same when it has maps. Fails with
+ * DIPOLE_NOT_SUPPORTED or DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_executor_run(struct render_executor *executor,
                                         const struct render_request *request,
                                         const struct render_plan *plan, const struct render_table *tables,
+                                        const struct lut_tsm *const *volumes,
                                         double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status);
 
 /* Copy a texture of the frame's size, RGBA, rows from the top. */
@@ -75,6 +79,12 @@ void render_executor_hand_on(struct render_executor *executor, const char *textu
 DIPOLE_CHECKED bool render_executor_need_splatter(const struct render_frame *frame,
                                                   struct render_splatter **splatter_out,
                                                   dipole_status *status);
+
+DIPOLE_CHECKED bool render_executor_need_tsm(const struct render_frame *frame, struct render_tsm **tsm_out,
+                                             dipole_status *status);
+
+/* What was made; NULL before. */
+struct render_tsm *render_executor_tsm(const struct render_executor *executor);
 
 /* What each object is made of, for common/medium.glsl; handed on as object_media. */
 DIPOLE_CHECKED bool render_executor_fill_media(const struct render_frame *frame, dipole_status *status);

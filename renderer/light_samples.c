@@ -1,5 +1,6 @@
 #include "renderer/light_samples.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -27,6 +28,7 @@ static const float *lit_texel(const struct reducer *reducer, int x, int y)
 {
     const struct render_light_view *const view = reducer->view;
     const size_t index = (size_t)y * (size_t)view->size_px + (size_t)x;
+    assert(view->texels);
     const float *const texel = view->texels + 4 * index;
     const bool is_its = !view->objects || view->objects[index] == (float)(reducer->object + 1);
     return texel[3] > 0 && is_its ? texel : NULL;
@@ -58,7 +60,7 @@ static double line_extent_mm(const struct reducer *reducer, int x, int y, int dx
         last = t;
         last_index = i;
     }
-    if (first_index == last_index)
+    if (!first || first_index == last_index)
         return 0;
     double step[3], along = 0;
     for (int k = 0; k < 3; k++) {

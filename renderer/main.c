@@ -5,9 +5,11 @@
 #include "renderer/reference.h"
 #include "renderer/tables.h"
 #include "renderer/view.h"
+#include "renderer/volumes.h"
 
 #include <jansson.h>
 #include <limits.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,6 +19,7 @@ struct options {
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
     int technique, context, area;
+    int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
@@ -37,7 +40,20 @@ struct job {
 /* In the order of enum render_context_kind, without the default. */
 static const char *const context_names[] = { "osmesa", "egl", "window", NULL };
 
+/* Index i: 2 i surfaces, which come in pairs. */
+static const char *const layer_count_names[] = { "0", "2", "4", "6", "8", "10", "12", "14", "16", NULL };
+
+/* Index 0: the usual number, or whatever the volumes of a folder have. */
+static const char *const sample_count_names[] = { "usual", "13", "21", "53", "117", "245", NULL };
+static const int sample_counts[] = { 0, 13, 21, 53, 117, 245 };
+
 /* ---- results ------------------------------------------------------------------------------------ */
+
+/* null where nothing bounds the error. */
+static json_t *create_error(double error)
+{
+    return isfinite(error) ? json_real(error) : json_null();
+}
 
 /* NULL: no memory, or a path that is not UTF-8. */
 static json_t *create_result(const struct render_report *report, const char *path)
@@ -45,10 +61,10 @@ static json_t *create_result(const struct render_report *report, const char *pat
     json_t *const effects = json_array();
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f, s:f, s:f}", "name", effect->name,
+        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f, s:f, s:o}", "name", effect->name,
                                                  "active", effect->is_active, "reason", effect->reason,
                                                  "predicted_ms", effect->predicted_ms, "ms",
-                                                 effect->time_ms, "error", effect->error));
+                                                 effect->time_ms, "error", create_error(effect->error)));
     }
     return json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique", render_technique_names[report->technique],
                      "epsilon", report->epsilon, "effects", effects, "total_ms", report->total_ms, "image",
@@ -80,6 +96,10 @@ static void print_plan(const struct render_report *report)
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);
     }
+    if (report->map_count > 0)
+        printf(
+            "error not bounded; of the table %.3g\n%d translucent shadow map%s, up to %d texels a side\n",
+            report->table_error, report->map_count, report->map_count == 1 ? "" : "s", report->map_side_px);
     if (report->doubling_count > 0)
         printf("%12s  estimated error\n", "samples");
     for (size_t i = 0; i < report->doubling_count; i++)
@@ -88,8 +108,11 @@ static void print_plan(const struct render_report *report)
            "time", "error", "", "", "ms", "ms");
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        printf("%-16s  %-6s  %9.1f  %9.1f  %8.2g  %s\n", effect->name, effect->is_active ? "yes" : "no",
-               effect->predicted_ms, effect->time_ms, effect->error, effect->reason);
+        char error[16] = "unbound.";
+        if (isfinite(effect->error))
+            snprintf(error, sizeof error, "%.2g", effect->error);
+        printf("%-16s  %-6s  %9.1f  %9.1f  %8s  %s\n", effect->name, effect->is_active ? "yes" : "no",
+               effect->predicted_ms, effect->time_ms, error, effect->reason);
     }
 }
 
@@ -208,13 +231,18 @@ static bool draw(struct job *job, dipole_status *status)
            cli_stdout_finish(status);
 }
 
-/* Of the folder that was named, if one was. */
-static bool find_tables(const struct job *job, struct render_tables **tables_out, dipole_status *status)
+/* What the technique asks of the folder that was named, if one was. */
+static bool find_tables(const struct job *job, struct render_tables **tables_out,
+                        struct render_volumes **volumes_out, dipole_status *status)
 {
+    const char *const folder = job->options->table_folder;
     struct render_media *media = NULL;
-    const bool is_done = !job->options->table_folder ||
-                         (render_media_create(job->scene, &media, status) &&
-                          render_tables_find(job->options->table_folder, media, tables_out, status));
+    bool is_done = !folder || render_media_create(job->scene, &media, status);
+    if (folder && is_done)
+        is_done = job->options->technique == RENDER_TECHNIQUE_TSM
+                      ? render_volumes_find(folder, media, sample_counts[job->options->tsm_samples],
+                                            volumes_out, status)
+                      : render_tables_find(folder, media, tables_out, status);
     render_media_destroy(media);
     return is_done;
 }
@@ -225,11 +253,14 @@ static bool draw_by_opengl(struct job *job, dipole_status *status)
     const enum render_context_kind kind =
         options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
     struct render_tables *tables = NULL;
-    bool is_done = find_tables(job, &tables, status);
+    struct render_volumes *volumes = NULL;
+    bool is_done = find_tables(job, &tables, &volumes, status);
     job->drawing.tables = tables ? tables->of_medium : NULL;
+    job->drawing.volumes = volumes ? (const struct lut_tsm *const *)volumes->volumes : NULL;
     is_done = is_done && render_create(job->scene, kind, &job->renderer, status) && draw(job, status);
     render_destroy(job->renderer);
     render_tables_destroy(tables);
+    render_volumes_destroy(volumes);
     return is_done;
 }
 
@@ -254,7 +285,12 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                        .options = options,
                        .drawing = { .technique = (enum render_technique)options->technique,
                                     .area = (enum render_area)options->area,
-                                    .epsilon = options->epsilon },
+                                    .epsilon = options->epsilon,
+                                    .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
+                                             .response = (enum render_tsm_response)options->tsm_response,
+                                             .part = (enum render_tsm_part)options->tsm_part,
+                                             .sample_count = sample_counts[options->tsm_samples],
+                                             .layer_count = 2 * options->layer_pairs } },
                        .frame_count = options->frames[1] - options->frames[0] + 1 };
     bool is_png = false, done = false;
     if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
@@ -288,7 +324,8 @@ int main(int argc, char **argv)
           .target = &options.technique,
           .argument = "NAME",
           .help = "splat: subsurface scattering; lambert: light leaves where it enters; auto: splat, or "
-                  "lambert where scattering stays within a pixel; reference: the integral over the surface "
+                  "lambert where scattering stays within a pixel; tsm: translucent shadow maps, fast and "
+                  "rough; reference: the integral over the surface "
                   "on the "
                   "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
@@ -300,6 +337,44 @@ int main(int argc, char **argv)
               "Area that a light sample stands for: flux, which needs none, or overlap, counted as in the "
               "paper, for comparison. Default flux.",
           .choices = render_area_names },
+        { .name = "tsm",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_gather,
+          .argument = "WHERE",
+          .help =
+              "Gather the global response of translucent shadow maps at each fragment, the default, or at "
+              "each vertex.",
+          .choices = render_tsm_gather_names },
+        { .name = "tsm-response",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_response,
+          .argument = "KIND",
+          .help =
+              "table: samples looked up in a volume, the default; exact: without a table; texels: the sum "
+              "over all texels, slow; profile: the same of the profile at the distance, as splats sum it.",
+          .choices = render_tsm_response_names },
+        { .name = "tsm-part",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_part,
+          .argument = "PART",
+          .help = "sum, the default, or the global or the local response alone.",
+          .choices = render_tsm_part_names },
+        { .name = "tsm-samples",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_samples,
+          .argument = "N",
+          .help = "Samples of a translucent shadow map for each point: 13, 21, 53, 117 or 245; usual, the "
+                  "default, "
+                  "is 21 as in the paper, or what the volumes in the folder of --luts have.",
+          .choices = sample_count_names },
+        { .name = "peel",
+          .kind = CLI_CHOICE,
+          .target = &options.layer_pairs,
+          .argument = "N",
+          .help =
+              "Tell material from air by N surfaces behind each other in translucent shadow maps, an even "
+              "number up to 16; default 0: all is taken for solid.",
+          .choices = layer_count_names },
         { .name = "epsilon",
           .letter = 'e',
           .kind = CLI_NUMBER,

@@ -11,7 +11,7 @@
 
 enum { LIGHT_LIMIT = 1024 };
 
-const char *const render_technique_names[] = { "auto", "splat", "lambert", "reference", NULL };
+const char *const render_technique_names[] = { "auto", "splat", "lambert", "reference", "tsm", NULL };
 const char *const render_area_names[] = { "flux", "overlap", NULL };
 
 static struct render_decision decision(bool is_active, const char *format, va_list arguments)
@@ -141,8 +141,8 @@ static bool take_media(const struct render_request *request, struct render_plan 
             !render_plan_check_table(&request->tables[m], plan->media->media[m].material, NULL, status))
             return false;
     }
-    plan->objects = calloc(scene->object_count, sizeof *plan->objects);
-    plan->of_medium = calloc(plan->media->count, sizeof *plan->of_medium);
+    plan->objects = calloc(scene->object_count + 1, sizeof *plan->objects);
+    plan->of_medium = calloc(plan->media->count + 1, sizeof *plan->of_medium);
     return (plan->objects && plan->of_medium) ||
            dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to plan %zu objects",
                        scene->object_count);
@@ -332,11 +332,13 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_spend_epsilon(request, plan);
         tell_objects_apart(request->scene, plan);
         choose_technique(request, plan);
-        done = render_plan_make_views(request, plan, status);
+        done =
+            render_plan_make_views(request, plan, status) && render_plan_make_maps(request, plan, status);
     }
     if (done) {
         render_plan_settle_spacing(request, plan);
         render_plan_predict_error(request, plan);
+        render_plan_predict_map_error(request, plan);
         decide(request, plan);
         done = render_plan_add_passes(plan, render_effects, status);
     }
@@ -355,6 +357,7 @@ void render_plan_destroy(struct render_plan *plan)
     free(plan->objects);
     free(plan->of_medium);
     free(plan->views);
+    free(plan->maps);
     free(plan->passes);
     free(plan);
 }

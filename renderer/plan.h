@@ -14,8 +14,10 @@ struct render_frame; /* execute.h */
 /* What is asked. */
 struct render_request {
     const struct io_scene *scene;
-    const struct render_media *media;  /* of the scene; NULL: made for this plan                  */
-    const struct render_table *tables; /* one for each medium; NULL: baked to the plan's table_epsilon */
+    const struct render_media *media;     /* of the scene; NULL: made for this plan                  */
+    const struct render_table *tables;    /* one for each medium; NULL: baked to the plan's table_epsilon */
+    const struct lut_tsm *const *volumes; /* the same of translucent shadow maps            */
+    struct render_tsm_options tsm;
     double epsilon;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
@@ -38,6 +40,7 @@ struct render_pass {
     const char *name; /* also of its shaders: NAME.vert or fullscreen.vert, NAME.frag */
     enum render_draw_kind draw;
     bool is_per_view; /* once for each of the lights' views        */
+    bool is_per_map;  /* once for each translucent shadow map      */
     bool is_added;    /* to what the target holds, else replaces it */
     bool is_blended;  /* draws add up, on a target that was cleared         */
     const char *reads[RENDER_PASS_READS];
@@ -77,7 +80,10 @@ struct render_decision render_not_called_for(const char *format, ...) DIPOLE_PRI
 
 /* OTHER: kept by its pass, which says how to bind it. */
 enum render_format { RENDER_RGBA32F = 0, RENDER_R32F, RENDER_DEPTH32F, RENDER_OTHER };
-enum render_size { RENDER_SIZE_FRAME = 0, RENDER_SIZE_LIGHT_VIEW };
+enum render_size { RENDER_SIZE_FRAME = 0, RENDER_SIZE_LIGHT_VIEW, RENDER_SIZE_MAP, RENDER_SIZE_VERTICES };
+
+/* Width of textures with a texel for each vertex of the scene. */
+enum { RENDER_VERTEX_ROW = 1024 };
 
 struct render_texture {
     const char *name;
@@ -100,12 +106,13 @@ struct render_plan_view {
     int size_px;
     int levels;        /* blocks of 2^levels texels are at most spacing wide */
     double texel_area; /* mm^2; perspective: at distance 1                  */
+    size_t object;     /* of translucent shadow maps: whose light it holds  */
 };
 
 struct render_plan_pass {
     const struct render_pass *pass;
     size_t effect; /* index into render_effects                        */
-    size_t view;   /* index into views, when the pass is_per_view      */
+    size_t view;   /* index into views, when the pass is_per_view; into maps, when is_per_map */
 };
 
 /* What becomes of one object. */
@@ -128,6 +135,7 @@ struct render_plan_medium {
     double blur_mm[IO_CHANNEL_COUNT]; /* of the profile, so that they do not show; 0: none is needed */
     struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
     int band_count;
+    double inner_mm; /* of the pattern of samples of translucent shadow maps     */
     double truncation_error, aliasing_error, blur_error, table_error;
 };
 
@@ -167,6 +175,10 @@ struct render_plan {
     size_t effect_count;
     struct render_plan_view *views;
     size_t view_count;
+    struct render_plan_view *maps; /* translucent shadow maps: of each light and visible object */
+    size_t map_count;
+    struct render_tsm_options tsm;
+    size_t vertex_count; /* of the scene, when the maps are gathered at vertices */
     struct render_plan_pass *passes;
     size_t pass_count;
 };
@@ -207,6 +219,12 @@ void render_plan_list_writes(const struct render_plan *plan, const struct render
 
 /* Whether the scene calls for a texture that a pass can write beside its others. */
 bool render_plan_wants(const struct render_plan *plan, const char *texture);
+
+/* Slices of a volume for so many samples, 0: the usual number; 0 when there is no such pattern. */
+int render_plan_slice_count(int sample_count);
+
+/* The texels of the largest map; 0 when there is none. */
+int render_plan_map_side_px(const struct render_plan *plan);
 
 /* Whether a pass of the plan writes, or needs, that texture. */
 bool render_plan_writes(const struct render_plan *plan, const char *texture);

@@ -20,6 +20,12 @@ void render_plan_predict_error(const struct render_request *request, struct rend
 DIPOLE_CHECKED bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,
                                            dipole_status *status);
 
+/* plan_tsm.c: the maps of technique tsm, the pattern of each medium, and what is known of the error. Fails
+ * also for options that contradict each other, and for volumes of other media. */
+DIPOLE_CHECKED bool render_plan_make_maps(const struct render_request *request, struct render_plan *plan,
+                                          dipole_status *status);
+void render_plan_predict_map_error(const struct render_request *request, struct render_plan *plan);
+
 /* How far apart the samples of a view may be: as asked, or as the coarsest texels allow. */
 double render_plan_widest_spacing_mm(const struct render_plan *plan);
 

@@ -21,6 +21,20 @@ static const struct render_texture textures[] = {
     { .name = "light_irradiance", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW }, /* per rgb */
     { .name = "light_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_LIGHT_VIEW },
     { .name = "light_samples", .format = RENDER_OTHER },
+    { .name = "tsm_volume", .format = RENDER_OTHER },  /* of the map's medium                        */
+    { .name = "tsm_pattern", .format = RENDER_OTHER }, /* the places of its samples                  */
+    { .name = "tsm_form", .format = RENDER_OTHER },    /* of the local response: R by distance, cosine */
+    { .name = "tsm_kernel", .format = RENDER_OTHER },  /* its cells                                  */
+    { .name = "tsm_sources", .format = RENDER_OTHER }, /* of its medium, instead of the volume       */
+    { .name = "tsm_factors", .format = RENDER_OTHER },
+    { .name = "tsm_position_mm", .size = RENDER_SIZE_MAP, .is_mipmapped = true }, /* times w = coverage */
+    { .name = "tsm_normal", .size = RENDER_SIZE_MAP, .is_mipmapped = true },      /* times coverage  */
+    { .name = "tsm_flux", .size = RENDER_SIZE_MAP, .is_mipmapped = true }, /* W/mm^2; point light: W/sr */
+    { .name = "tsm_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_MAP },
+    { .name = "tsm_layers", .format = RENDER_OTHER, .size = RENDER_SIZE_MAP }, /* depths of surfaces */
+    { .name = "tsm_vertices", .format = RENDER_OTHER },                        /* as position_mm    */
+    { .name = "tsm_vertex_radiosity", .size = RENDER_SIZE_VERTICES },
+    { .name = "tsm_surface_radiosity", .is_multisampled = true }, /* w = object + 1                  */
     { .name = "overlap_sum" }, /* irradiance times R_d, summed; a = how many samples                 */
     { .name = "radiosity" },   /* W/mm^2                                                              */
     { .name = "specular" },    /* radiance, already averaged over the pixel                           */
@@ -136,11 +150,31 @@ static bool check_pass(const struct render_plan *plan, size_t index, dipole_stat
     return true;
 }
 
+static bool are_repeated_together(const struct render_pass *a, const struct render_pass *b)
+{
+    return (a->is_per_view && b->is_per_view) || (a->is_per_map && b->is_per_map);
+}
+
+/* Append rows begin to end, once or as often as there are views or maps. */
+static void repeat_rows(struct render_plan *plan, const struct render_plan_pass *rows, size_t begin,
+                        size_t end)
+{
+    const struct render_pass *const pass = rows[begin].pass;
+    const size_t repeats = pass->is_per_view ? plan->view_count : pass->is_per_map ? plan->map_count : 1;
+    for (size_t view = 0; view < repeats; view++) {
+        for (size_t i = begin; i < end; i++) {
+            plan->passes[plan->pass_count] = rows[i];
+            plan->passes[plan->pass_count++].view = view;
+        }
+    }
+}
+
 bool render_plan_add_passes(struct render_plan *plan, const struct render_effect *const *effects,
                             dipole_status *status)
 {
     const size_t row_count = list_passes(plan, effects, NULL);
-    const size_t repeats = plan->view_count > 1 ? plan->view_count : 1;
+    const size_t most = plan->view_count > plan->map_count ? plan->view_count : plan->map_count;
+    const size_t repeats = most > 1 ? most : 1;
     struct render_plan_pass *const rows = calloc(row_count + 1, sizeof *rows);
     plan->passes = calloc(row_count * repeats + 1, sizeof *plan->passes);
     bool done = rows && plan->passes;
@@ -150,18 +184,9 @@ bool render_plan_add_passes(struct render_plan *plan, const struct render_effect
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu passes", row_count * repeats);
     for (size_t begin = 0, end; done && begin < row_count; begin = end) {
         end = begin + 1;
-        if (!rows[begin].pass->is_per_view) {
-            plan->passes[plan->pass_count++] = rows[begin];
-            continue;
-        }
-        while (end < row_count && rows[end].pass->is_per_view)
+        while (end < row_count && are_repeated_together(rows[begin].pass, rows[end].pass))
             end++;
-        for (size_t view = 0; view < plan->view_count; view++) {
-            for (size_t i = begin; i < end; i++) {
-                plan->passes[plan->pass_count] = rows[i];
-                plan->passes[plan->pass_count++].view = view;
-            }
-        }
+        repeat_rows(plan, rows, begin, end);
     }
     free(rows);
     for (size_t i = 0; done && i < plan->pass_count; i++)

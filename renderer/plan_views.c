@@ -117,6 +117,7 @@ static size_t point_views(const struct io_scene *scene, const struct render_plan
         return 1;
     }
     view.is_cube_face = true;
+    view.projection.near_mm *= 0.577; /* the corner of a face is sqrt(3) times as far away as it is deep */
     view.projection.half_width = view.projection.half_height = 1;
     for (int face = 0; face < 6; face++) {
         double forward[3] = { 0, 0, 0 };

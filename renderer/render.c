@@ -47,6 +47,7 @@ void render_destroy(struct renderer *renderer)
         render_executor_destroy(renderer->executor);
     render_context_destroy(renderer->context);
     render_tables_destroy(renderer->tables);
+    render_volumes_destroy(renderer->volumes);
     render_media_destroy(renderer->media);
     free(renderer);
 }
@@ -76,15 +77,38 @@ static bool tables_for(struct renderer *renderer, const struct render_request *r
     return true;
 }
 
-bool render_run(struct renderer *renderer, const struct render_request *request,
+/* Volumes for the request, if it has none and may need some: baked now and kept for later calls. */
+static bool add_volumes(struct renderer *renderer, struct render_request *request, dipole_status *status)
+{
+    if (request->technique != RENDER_TECHNIQUE_TSM || request->volumes || request->is_captured)
+        return true;
+    const double epsilon = render_volume_epsilon(request->epsilon);
+    const int slice_count = render_plan_slice_count(request->tsm.sample_count);
+    if (slice_count == 0) /* the plan tells */
+        return true;
+    if (!renderer->volumes || renderer->volumes->epsilon > epsilon ||
+        renderer->volumes->slice_count != slice_count) {
+        render_volumes_destroy(renderer->volumes);
+        renderer->volumes = NULL;
+        if (!render_volumes_bake(renderer->media, epsilon, slice_count, &renderer->volumes, status))
+            return false;
+    }
+    request->volumes = (const struct lut_tsm *const *)renderer->volumes->volumes;
+    return true;
+}
+
+bool render_run(struct renderer *renderer, const struct render_request *request_in,
                 struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
 {
     const struct render_table *tables;
+    struct render_request request = *request_in;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
-    const bool done = render_plan_create(request, &plan, status) && render_make_current(renderer, status) &&
-                      tables_for(renderer, request, plan, &tables, status) &&
-                      render_executor_run(renderer->executor, request, plan, tables, time_ms, status);
+    const bool done =
+        render_plan_check_request(request.scene, request.epsilon, status) &&
+        add_volumes(renderer, &request, status) && render_plan_create(&request, &plan, status) &&
+        render_make_current(renderer, status) && tables_for(renderer, &request, plan, &tables, status) &&
+        render_executor_run(renderer->executor, &request, plan, tables, request.volumes, time_ms, status);
     if (done)
         *plan_out = plan;
     else
@@ -112,6 +136,8 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
         .sample_count = splatter ? render_splatter_sample_count(splatter) : 0,
         .splat_count = splatter ? render_splatter_splat_count(splatter) : 0,
         .view_count = plan->view_count,
+        .map_count = (int)plan->map_count,
+        .map_side_px = render_plan_map_side_px(plan),
         .effect_count = plan->effect_count,
         .note_count = plan->note_count,
     };
@@ -168,6 +194,8 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
         .media = renderer->media,
         .tables = options->tables,
+        .volumes = options->volumes,
+        .tsm = options->tsm,
         .is_tone_mapped = options->is_tone_mapped,
     };
     double time_ms[RENDER_EFFECT_LIMIT];

@@ -23,8 +23,10 @@ enum render_technique {
     RENDER_TECHNIQUE_SPLAT,
     RENDER_TECHNIQUE_LAMBERT,
     RENDER_TECHNIQUE_REFERENCE,
+    RENDER_TECHNIQUE_TSM, /* translucent shadow maps; never taken by default */
 };
-extern const char *const render_technique_names[]; /* "auto", "splat", "lambert", "reference", NULL */
+/* "auto", "splat", "lambert", "reference", "tsm", NULL */
+extern const char *const render_technique_names[];
 
 /* How a splat knows the area that its sample stands for: by the flux of its texels, which needs no area; or
  * as in the paper, its disc of r_max over the number of samples that overlap a pixel, for comparison. */
@@ -63,13 +65,48 @@ struct render_progress {
     void *context;
 };
 
+/* Where the global response is gathered: at each fragment, or at the meshes' vertices and interpolated. */
+enum render_tsm_gather { RENDER_TSM_FRAGMENT = 0, RENDER_TSM_VERTEX };
+extern const char *const render_tsm_gather_names[]; /* "fragment", "vertex", NULL */
+
+/*
+ * What is summed. TABLE: the samples of the pattern, each looked up in a volume. EXACT: the same without a
+ * table. TEXELS: the 3D form of theory.md T30 over all texels of the map. PROFILE: R_d of the distance over
+ * all texels, which is what splats sum. From one to the next one source of error goes: the table, the
+ * samples, the form.
+ */
+enum render_tsm_response {
+    RENDER_TSM_TABLE = 0,
+    RENDER_TSM_EXACT,
+    RENDER_TSM_TEXELS,
+    RENDER_TSM_PROFILE,
+};
+extern const char *const render_tsm_response_names[]; /* "table", "exact", "texels", "profile", NULL */
+
+/* Which part of the response; all of it when texels are summed. */
+enum render_tsm_part { RENDER_TSM_SUM = 0, RENDER_TSM_GLOBAL, RENDER_TSM_LOCAL };
+extern const char *const render_tsm_part_names[]; /* "sum", "global", "local", NULL */
+
+/* Of translucent shadow maps alone. */
+struct render_tsm_options {
+    enum render_tsm_gather gather;
+    enum render_tsm_response response;
+    enum render_tsm_part part;
+    int sample_count; /* of the pattern: 13, 21, 53, 117 or 245; 0: 21, or what the volumes have */
+    int layer_count;  /* 0: all between a point and where its light entered is taken for solid; else so many
+                         surfaces behind each other, even, up to RENDER_TSM_LAYER_LIMIT, tell what is air */
+};
+enum { RENDER_TSM_LAYER_LIMIT = 16 };
+
 struct render_options {
     enum render_technique technique;
     double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
     enum render_area area;
-    const struct render_table *tables; /* one for each of the scene's media; NULL: baked in memory */
-    bool is_tone_mapped;               /* 0..1 over the scene's background, for a PNG; else
-                                          linear radiance, premultiplied by coverage (alpha)  */
+    const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
+    const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
+    struct render_tsm_options tsm;
+    bool is_tone_mapped; /* 0..1 over the scene's background, for a PNG; else
+                            linear radiance, premultiplied by coverage (alpha)  */
 
     /* Of the reference alone. */
     struct render_progress progress;
@@ -77,7 +114,7 @@ struct render_options {
     size_t sample_limit; /* 0: RENDER_REFERENCE_SAMPLE_LIMIT                            */
 };
 
-enum { RENDER_EFFECT_LIMIT = 16, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
+enum { RENDER_EFFECT_LIMIT = 32, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
 
 /* One step of the reference: surface samples so far, and the error estimated from them. */
 struct render_doubling {
@@ -97,12 +134,13 @@ struct render_effect_report {
 struct render_report {
     enum render_technique technique; /* never AUTO */
     double epsilon;
-    double error_predicted; /* the sum of these five; of the reference estimated */
+    double error_predicted; /* the sum of these five; of the reference estimated; INFINITY: not bounded */
     double truncation_error, aliasing_error, blur_error, banding_error, table_error;
     double r_max_mm, spacing_mm; /* 0 when not splatted */
     size_t sample_count;         /* at the finest */
     size_t splat_count, view_count;
     int band_count;
+    int map_count, map_side_px; /* translucent shadow maps, and the side of the largest */
     struct render_effect_report effects[RENDER_EFFECT_LIMIT];
     size_t effect_count;
     struct render_doubling doublings[RENDER_DOUBLING_LIMIT]; /* of the reference */

@@ -5,6 +5,7 @@
 #include "renderer/context.h"
 #include "renderer/execute.h"
 #include "renderer/tables.h"
+#include "renderer/volumes.h"
 
 struct renderer {
     const struct io_scene *scene;
@@ -12,7 +13,8 @@ struct renderer {
     struct render_gl_errors errors;
     struct render_executor *executor;
     struct render_media *media;
-    struct render_tables *tables; /* baked when a plan first needed them, to the finest asked so far */
+    struct render_tables *tables;   /* baked when a plan first needed them, to the finest asked so far */
+    struct render_volumes *volumes; /* the same                                                 */
 };
 
 DIPOLE_CHECKED bool render_make_current(struct renderer *renderer, dipole_status *status);

@@ -168,12 +168,22 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
 
 /* ---- splats ------------------------------------------------------------------------------------- */
 
+static bool is_same_band(const struct render_band *a, const struct render_band *b)
+{
+    return a->spacing_mm == b->spacing_mm && a->r_inner_mm == b->r_inner_mm &&
+           a->r_outer_mm == b->r_outer_mm && a->rise_mm == b->rise_mm && a->fall_mm == b->fall_mm;
+}
+
 static bool is_table_of(const struct table_key *key, const struct render_table *table,
                         const struct render_plan_medium *planned)
 {
-    return key->table == table->lut && key->row == table->row && key->band_count == planned->band_count &&
-           memcmp(key->blur_mm, planned->blur_mm, sizeof key->blur_mm) == 0 &&
-           memcmp(key->bands, planned->bands, sizeof key->bands) == 0;
+    bool is_same =
+        key->table == table->lut && key->row == table->row && key->band_count == planned->band_count;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        is_same = is_same && key->blur_mm[c] == planned->blur_mm[c];
+    for (int b = 0; b < planned->band_count; b++)
+        is_same = is_same && is_same_band(&key->bands[b], &planned->bands[b]);
+    return is_same;
 }
 
 /* Fill the buffer of profiles, all media one after the other, unless it holds them already. */
@@ -192,7 +202,7 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     }
     if (is_known)
         return true;
-    float *const nodes = calloc(node_count, 4 * sizeof *nodes), *next = nodes;
+    float *const nodes = calloc(node_count + 1, 4 * sizeof *nodes), *next = nodes;
     if (!nodes)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for profiles of %zu nodes",
                            node_count);

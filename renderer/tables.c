@@ -15,7 +15,7 @@ static struct render_tables *tables_create(const struct render_media *media, siz
     struct render_tables *const tables = calloc(1, sizeof *tables);
     if (tables) {
         tables->of_medium = calloc(media->count, sizeof *tables->of_medium);
-        tables->luts = calloc(lut_limit + 1, sizeof *tables->luts);
+        tables->luts = calloc(lut_limit + 1, sizeof(void *));
     }
     if (tables && tables->of_medium && tables->luts)
         return tables;

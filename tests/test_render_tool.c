@@ -179,8 +179,8 @@ static void wrong_usage_is_code_2(void **state)
 {
     (void)state;
     fails_with(RENDER " sphere.json", 2, "render: no --output (-o) IMG was given; try --help\n");
-    fails_with(RENDER " sphere.json -o bad.exr --technique tsm", 2,
-               "render: --technique is \"tsm\", expected one of auto, splat, lambert, reference\n");
+    fails_with(RENDER " sphere.json -o bad.exr --technique magic", 2,
+               "render: --technique is \"magic\", expected one of auto, splat, lambert, reference, tsm\n");
     fails_with(RENDER " sphere.json -o bad.exr --context glx", 2,
                "render: --context is \"glx\", expected one of osmesa, egl, window\n");
     fails_with(RENDER " turn.json -o bad.exr --frames 2:1", 2,
@@ -192,6 +192,28 @@ static void wrong_usage_is_code_2(void **state)
     assert_int_equal(run(RENDER " sphere.json -o bad.exr --epsilon 0", out, err, sizeof out), 2);
     assert_int_equal(run(RENDER " sphere.json -o bad.exr --budget-ms 5", out, err, sizeof out), 2);
     assert_int_equal(run(RENDER " -o bad.exr", out, err, sizeof out), 2);
+}
+
+/* Oracle: exit codes and messages. Options of shadow maps are taken together, and refused where they
+ * contradict. */
+static void shadow_maps_take_their_options(void **state)
+{
+    (void)state;
+    char out[32768], err[32768];
+    assert_int_equal(run(RENDER " sphere.json -t tsm --tsm vertex --tsm-response exact --tsm-part global "
+                                "--tsm-samples 13 --peel 4 --explain -o good.exr",
+                         out, err, sizeof out),
+                     0);
+    assert_string_equal(err, "");
+    assert_non_null(strstr(out, "error not bounded; of the table 0\n"));
+    assert_non_null(strstr(out, "4 layers are asked for"));
+    assert_int_equal(unlink("good.exr"), 0);
+    fails_with(
+        RENDER " sphere.json -t tsm --tsm-response texels --peel 2 -o bad.exr", 1,
+        "render: response \"texels\" sums all texels at each fragment: it has no parts, no vertices and no "
+        "layers\n");
+    fails_with(RENDER " sphere.json -t tsm --peel 3 -o bad.exr", 2,
+               "render: --peel is \"3\", expected one of 0, 2, 4, 6, 8, 10, 12, 14, 16\n");
 }
 
 /* Oracle: the environment, made unfit for each backend: every one tried is named with its reason. */
@@ -357,8 +379,8 @@ static void tables_on_disk_are_found_by_their_medium(void **state)
                          "/lutgen skin1.json -o others",
                          out, err, sizeof out),
                      0);
-    assert_int_equal(run(RENDER " sphere.json -o memory.exr && " RENDER
-                                " sphere.json -o disk.exr --luts tables",
+    assert_int_equal(run(RENDER " sphere.json -o memory.exr -e 0.05 && " RENDER
+                                " sphere.json -o disk.exr -e 0.05 --luts tables",
                          out, err, sizeof out),
                      0);
     assert_string_equal(err, "");
@@ -422,6 +444,7 @@ int main(void)
         cmocka_unit_test_setup(bad_input_is_one_line_and_no_picture, setup),
         cmocka_unit_test_setup(every_model_is_drawn, setup),
         cmocka_unit_test_setup(wrong_usage_is_code_2, setup),
+        cmocka_unit_test_setup(shadow_maps_take_their_options, setup),
         cmocka_unit_test_setup(a_missing_context_names_what_was_tried, setup),
         cmocka_unit_test_setup(results_are_told_as_promised, setup),
         cmocka_unit_test_setup(frames_are_numbered_pictures, setup),
