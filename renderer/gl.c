@@ -165,6 +165,16 @@ static bool compile(const struct render_shader *shader, const char *defines, GLe
     return done;
 }
 
+/* They go, now that the program is linked. */
+static void detach_shaders(GLuint program)
+{
+    GLuint shaders[2];
+    GLsizei count = 0;
+    glGetAttachedShaders(program, 2, &count, shaders);
+    for (GLsizei i = 0; i < count; i++)
+        glDetachShader(program, shaders[i]);
+}
+
 bool render_program_create(const struct render_shader *vertex, const struct render_shader *fragment,
                            const char *defines, GLuint *program_out, dipole_status *status)
 {
@@ -184,10 +194,12 @@ bool render_program_create(const struct render_shader *vertex, const struct rend
                         fragment->name, (int)strcspn(log, "\n"), log);
         }
     }
-    if (done)
+    if (done) {
         *program_out = program;
-    else
+        detach_shaders(program);
+    } else {
         glDeleteProgram(program);
+    }
     return done;
 }
 

@@ -119,9 +119,10 @@ struct render_plan_pass {
 struct render_plan_object {
     size_t medium;
     struct render_ball ball;
-    bool is_visible;    /* some of it may be in the picture; what is not is no more than a blocker */
-    double pixel_count; /* that it may cover, as a ball would                                     */
-    double spacing_mm;  /* of its finest light samples                                            */
+    bool is_visible;     /* some of it may be in the picture; what is not is no more than a blocker   */
+    double lit_area_mm2; /* of its surface that faces a light, light by light, whatever is in the way */
+    double pixel_count;  /* that it may cover, as a ball would                                       */
+    double spacing_mm;   /* of its finest light samples                                              */
 };
 
 /* What becomes of the visible objects of one medium. All 0 where there are none. */
@@ -129,7 +130,8 @@ struct render_plan_medium {
     bool is_visible;
     double diameter_mm;               /* of the largest object                            */
     double r_max_mm;                  /* splats reach as far                              */
-    double spacing_mm;                /* asked of the finest light samples                */
+    double wanted_mm;                 /* spacing of light samples that epsilon asks for   */
+    double spacing_mm;                /* of the finest: as wanted, or as many as may be   */
     double blur_mm[IO_CHANNEL_COUNT]; /* of the profile, so that they do not show; 0: none is needed */
     struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
     int band_count;

@@ -89,8 +89,9 @@ static void spend_on_medium(const struct render_request *request, struct render_
     else
         planned->truncation_error = worst(medium, tail, planned->r_max_mm, 0);
     const double widest_mm = planned->diameter_mm / SAMPLES_ACROSS;
-    planned->spacing_mm =
+    planned->wanted_mm =
         request->spacing_mm > 0 ? request->spacing_mm : sampled_spacing_mm(plan, medium, widest_mm);
+    planned->spacing_mm = planned->wanted_mm;
     plan->r_max_mm = fmax(plan->r_max_mm, planned->r_max_mm);
     plan->spacing_mm = fmin(plan->spacing_mm, planned->spacing_mm);
 }
@@ -109,6 +110,39 @@ static void space_objects(const struct render_request *request, struct render_pl
     }
 }
 
+/* How many light samples there would be, about, if they were least_mm apart at least. */
+static double expected_samples(const struct render_request *request, const struct render_plan *plan,
+                               double least_mm)
+{
+    double count = 0;
+    for (size_t i = 0; i < request->scene->object_count; i++) {
+        const struct render_plan_object *const object = &plan->objects[i];
+        const double spacing_mm = fmax(object->spacing_mm, least_mm);
+        if (object->spacing_mm > 0)
+            count += object->lit_area_mm2 / spacing_mm / spacing_mm;
+    }
+    return count;
+}
+
+/* Set samples so far apart that there are not too many of them. The views' texels limit them as well, but
+ * the bands are laid out for what is asked here: the coarsest must leave few samples of a whole scene. */
+static void limit_samples(const struct render_request *request, struct render_plan *plan)
+{
+    const double limit = (double)RENDER_LIGHT_SAMPLE_LIMIT;
+    double least_mm = plan->spacing_mm;
+    while (expected_samples(request, plan, least_mm) > limit)
+        least_mm *= 1.05;
+    for (size_t i = 0; i < request->scene->object_count; i++) {
+        if (plan->objects[i].spacing_mm > 0)
+            plan->objects[i].spacing_mm = fmax(plan->objects[i].spacing_mm, least_mm);
+    }
+    for (size_t m = 0; m < plan->media->count; m++) {
+        if (plan->of_medium[m].spacing_mm > 0)
+            plan->of_medium[m].spacing_mm = fmax(plan->of_medium[m].spacing_mm, least_mm);
+    }
+    plan->spacing_mm = least_mm;
+}
+
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan)
 {
     plan->truncation_epsilon = TRUNCATION_SHARE * plan->epsilon;
@@ -119,6 +153,7 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     for (size_t m = 0; m < plan->media->count; m++)
         spend_on_medium(request, plan, m);
     space_objects(request, plan);
+    limit_samples(request, plan);
     if (isinf(plan->spacing_mm)) /* nothing scatters */
         plan->spacing_mm =
             request->spacing_mm > 0 ? request->spacing_mm : 2 * plan->ball.radius_mm / SAMPLES_ACROSS;
@@ -155,7 +190,7 @@ static void settle_medium(const struct render_request *request, struct render_pl
 {
     const struct render_medium *const medium = &plan->media->media[index];
     struct render_plan_medium *const planned = &plan->of_medium[index];
-    const double wanted_mm = planned->spacing_mm;
+    const double wanted_mm = planned->wanted_mm;
     if (!(wanted_mm > 0))
         return;
     const double decades = log10(RING_EPSILON / plan->epsilon);
@@ -164,12 +199,12 @@ static void settle_medium(const struct render_request *request, struct render_pl
      */
     const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
     const double reach_mm = planned->r_max_mm;
-    planned->band_count =
-        render_bands_make(wanted_mm, reach_mm, is_single ? INFINITY : ring_spacings, planned->bands);
+    planned->band_count = render_bands_make(planned->spacing_mm, reach_mm,
+                                            is_single ? INFINITY : ring_spacings, planned->bands);
     plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
     if (request->is_captured)
         return;
-    const double spacing_mm = fmax(wanted_mm, texel_mm);
+    const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
     planned->aliasing_error = worst(medium, render_footprint_aliasing, spacing_mm, 0);
     if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))
         blur_channels(plan, medium, spacing_mm, planned);
@@ -178,10 +213,10 @@ static void settle_medium(const struct render_request *request, struct render_pl
         render_plan_add_note(
             plan,
             "light samples of material \"%.60s\" are %.3g mm apart, %.3g mm were asked: a "
-            "light's view is limited to %d texels a side; edges of shadows blur by %.2g mm, "
-            "which changes them by up to %.2g",
-            medium->material->name, spacing_mm, wanted_mm, RENDER_VIEW_SIDE_LIMIT, widest_blur_mm,
-            planned->blur_error);
+            "light's view is limited to %d texels a side, all to %zu; edges of shadows blur by "
+            "%.2g mm, which changes them by up to %.2g",
+            medium->material->name, spacing_mm, wanted_mm, RENDER_VIEW_SIDE_LIMIT,
+            RENDER_LIGHT_SAMPLE_LIMIT, widest_blur_mm, planned->blur_error);
 }
 
 void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan)

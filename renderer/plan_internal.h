@@ -4,7 +4,8 @@
 
 #include "renderer/plan.h"
 
-/* Texels a side of a light's view: every OpenGL 4.5 has 16384; six floats32x4 of this take 268 MB each. */
+/* Texels a side of a light's view: every OpenGL 4.5 has 16384; this many of four floats take 268 MB. And of
+ * all views together: RENDER_LIGHT_SAMPLE_LIMIT texels, since each may become a sample. */
 enum { RENDER_VIEW_SIDE_LIMIT = 4096 };
 
 void render_plan_add_note(struct render_plan *plan, const char *format, ...) DIPOLE_PRINTF(2, 3);

@@ -15,6 +15,7 @@ enum {
     VIEW_SIDE_WANTED = 768, /* shadows are drawn from the same view, so it never is coarser if it can */
     LEVELS_WANTED = 2,
     LEVELS_LIMIT = 12,
+    BLOCK_LEVELS_LIMIT = 7, /* blocks are searched once for each level: larger ones save few samples */
 };
 
 /* A point light this wide or less, seen from it, gets one view; a wider scene six. */
@@ -29,21 +30,33 @@ static int levels_of_coarsest(const struct render_plan *plan)
     return (int)log2(coarsest_mm / plan->spacing_mm);
 }
 
-/* Texels of a view so wide (at its far end) that blocks of them are at most the spacing wide there. */
-static void choose_view_size(const struct render_plan *plan, double width_mm, struct render_plan_view *view)
+/* Views of all lights together must not have too many texels; but shadows want some. */
+static int side_limit_px(const struct render_plan *plan)
 {
+    const double share_px = sqrt((double)RENDER_LIGHT_SAMPLE_LIMIT / (double)plan->view_count);
+    return (int)fmin(fmax(share_px, VIEW_SIDE_WANTED), RENDER_VIEW_SIDE_LIMIT);
+}
+
+/* Texels of a view so wide (at its far end) that blocks of them are at most the spacing wide there; where
+ * the surface is nearer, blocks of more of them are as wide. */
+static void choose_view_size(const struct render_plan *plan, struct render_plan_view *view)
+{
+    const struct render_projection *const projection = &view->projection;
+    const double width_mm =
+        2 * projection->half_width * (projection->is_orthographic ? 1 : projection->far_mm);
     const double cells = ceil(width_mm / (CELL_SHARE * plan->spacing_mm) * (1 - 1e-9));
-    const int cell_count = cells >= RENDER_VIEW_SIDE_LIMIT ? RENDER_VIEW_SIDE_LIMIT
-                           : cells < 1                     ? 1
-                                                           : (int)cells;
-    view->levels = LEVELS_WANTED;
-    while (view->levels < LEVELS_LIMIT && cell_count << view->levels < VIEW_SIDE_WANTED)
-        view->levels++;
-    while (view->levels > 0 && cell_count << view->levels > RENDER_VIEW_SIDE_LIMIT)
-        view->levels--;
-    view->size_px = cell_count << view->levels;
-    view->levels += levels_of_coarsest(plan);
-    const double texel = 2 * view->projection.half_width / view->size_px;
+    const int limit_px = side_limit_px(plan);
+    const int cell_count = cells >= limit_px ? limit_px : cells < 1 ? 1 : (int)cells;
+    int levels = LEVELS_WANTED;
+    while (levels < LEVELS_LIMIT && cell_count << levels < VIEW_SIDE_WANTED)
+        levels++;
+    while (levels > 0 && cell_count << levels > limit_px)
+        levels--;
+    view->size_px = cell_count << levels;
+    const double nearer =
+        projection->is_orthographic ? 0 : ceil(log2(projection->far_mm / projection->near_mm));
+    view->levels = (int)fmin(levels + levels_of_coarsest(plan) + nearer, BLOCK_LEVELS_LIMIT);
+    const double texel = 2 * projection->half_width / view->size_px;
     view->texel_area = texel * texel;
 }
 
@@ -77,7 +90,6 @@ static struct render_plan_view directional_view(const struct io_scene *scene,
         view.projection.eye_mm[k] = 0.5 * (min[0] + max[0]) * view.projection.right[k] +
                                     0.5 * (min[1] + max[1]) * view.projection.up[k] +
                                     (min[2] - 2 * slack_mm) * view.projection.forward[k];
-    choose_view_size(plan, 2 * view.projection.half_width, &view);
     return view;
 }
 
@@ -101,17 +113,12 @@ static size_t point_views(const struct io_scene *scene, const struct render_plan
         render_projection_aim(&view.projection, toward, up);
         view.projection.half_width = view.projection.half_height =
             tan(asin(radius_mm / distance_mm)) * (1 + 2.0 / VIEW_SIDE_WANTED);
-        choose_view_size(plan, 2 * view.projection.half_width * view.projection.far_mm, &view);
-        const double nearer = log2(view.projection.far_mm / view.projection.near_mm);
-        view.levels += (int)ceil(fmax(fmin(nearer, LEVELS_LIMIT - view.levels), 0));
         views[0] = view;
         return 1;
     }
     view.is_cube_face = true;
     view.projection.near_mm *= 0.577; /* the corner of a face is sqrt(3) times as far away as it is deep */
     view.projection.half_width = view.projection.half_height = 1;
-    choose_view_size(plan, 2 * view.projection.far_mm, &view);
-    view.levels = LEVELS_LIMIT; /* the surface may be as near as it likes */
     for (int face = 0; face < 6; face++) {
         double forward[3] = { 0, 0, 0 };
         forward[face / 2] = face % 2 ? -1 : 1;
@@ -156,5 +163,7 @@ bool render_plan_make_views(const struct render_request *request, struct render_
             plan->view_count++;
         }
     }
+    for (size_t i = 0; i < plan->view_count; i++)
+        choose_view_size(plan, &plan->views[i]);
     return true;
 }

@@ -42,6 +42,10 @@ extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 enum { RENDER_SIDE_LIMIT = 16384 };
 #define RENDER_PIXEL_LIMIT ((size_t)1 << 24)
 
+/* So many light samples at the most, whatever epsilon asks for, 32 bytes each: so many texels do all
+ * lights' views have, unless there are very many lights. */
+#define RENDER_LIGHT_SAMPLE_LIMIT ((size_t)1 << 25)
+
 /* Draws one scene, any number of times. End it with render_destroy. */
 struct renderer;
 
@@ -171,7 +175,8 @@ struct render_capture {
     struct render_light_samples samples; /* spacing_mm apart or less                                */
 };
 
-/* Fails as render_draw does; the caller ends *capture_out with render_capture_destroy. spacing_mm > 0. */
+/* Fails as render_draw does; the caller ends *capture_out with render_capture_destroy. spacing_mm > 0;
+ * samples are farther apart where they would be more than RENDER_LIGHT_SAMPLE_LIMIT. */
 DIPOLE_CHECKED bool render_capture_create(struct renderer *renderer, double spacing_mm,
                                           struct render_capture **capture_out, dipole_status *status);
 void render_capture_destroy(struct render_capture *capture);

@@ -49,9 +49,11 @@ bool render_tables_bake(const struct render_media *media, double epsilon, struct
                                             .epsilon = epsilon };
         if (!media->media[m].has_scattering)
             continue;
-        if (!lut_splat_bake(&wanted, &tables->luts[tables->lut_count], status)) {
+        dipole_status reason;
+        if (!lut_splat_bake(&wanted, &tables->luts[tables->lut_count], &reason)) {
             render_tables_destroy(tables);
-            return false;
+            return dipole_fail(status, reason.code, NULL, "no table of material \"%.60s\": %s",
+                               wanted.materials->name, reason.message);
         }
         tables->of_medium[m].lut = tables->luts[tables->lut_count++];
     }

@@ -24,8 +24,8 @@ vec3 radiosity_at(vec4 position_ws_mm, vec3 normal_ws, ivec2 pixel)
             ivec2 at = clamp(pixel + ivec2(i, j), ivec2(0), ivec2(width_px - 1, height_px - 1));
             vec4 there_mm = texelFetch(position_mm, at, 0);
             vec3 step_mm = there_mm.xyz - position_ws_mm.xyz;
-            float spread = dot(step_mm, step_mm) + blur_mm * blur_mm;
-            float weight = there_mm.w == position_ws_mm.w ? blur_mm * blur_mm * blur_mm * blur_mm / (spread * spread) : 0.0;
+            float part = blur_mm * blur_mm / max(dot(step_mm, step_mm) + blur_mm * blur_mm, 1e-37);
+            float weight = there_mm.w == position_ws_mm.w ? part * part : 0.0;
             sum += weight * texelFetch(radiosity, at, 0).rgb;
             weight_sum += weight;
         }
@@ -45,7 +45,9 @@ void main()
         sum.a += 1.0;
 #ifdef HAS_RADIOSITY
         vec3 normal_ws = texelFetch(surface_normal, pixel, i).xyz;
-        sum.rgb += radiosity_at(point_mm, normal_ws, pixel) * exit_per_sr(point_mm, normal_ws);
+        // profiles averaged over the samples' footprints overshoot a little (theory.md T34)
+        vec3 leaving = max(radiosity_at(point_mm, normal_ws, pixel), vec3(0.0));
+        sum.rgb += leaving * exit_per_sr(point_mm, normal_ws);
 #endif
     }
     radiance = sum / 4.0;

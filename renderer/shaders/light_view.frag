@@ -25,14 +25,14 @@ layout(location = 1) out float light_irradiance;
 void main()
 {
     vec3 to_light = toward(light, position_ws_mm);
-    float cosine = clamp(dot(normalize(normal_ws), to_light), 0.0, 1.0);
+    float cosine = clamp(dot(unit_or(normal_ws, to_light), to_light), 0.0, 1.0);
     float axis_cosine = light.w > 0.0 ? -dot(to_light, forward_ws) : 1.0;
     float size = texel_area * axis_cosine * axis_cosine * axis_cosine;
     float share = gl_FrontFacing ? size * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;
     position_and_share = vec4(position_ws_mm, share);
 #ifdef HAS_LIGHT_IRRADIANCE
     vec3 step_mm = light.xyz - position_ws_mm;
-    float falloff = light.w > 0.0 ? 1.0 / dot(step_mm, step_mm) : 1.0;
+    float falloff = light.w > 0.0 ? 1.0 / max(dot(step_mm, step_mm), 1e-24) : 1.0;
     light_irradiance =
         gl_FrontFacing ? falloff * cosine * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;
 #endif

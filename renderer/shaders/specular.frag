@@ -16,7 +16,7 @@ float ggx(float alpha, float cosine_normal_half, float cosine_in, float cosine_o
     float distribution = a2 / (3.14159265358979 * d * d);
     float smith_in = cosine_out * sqrt(a2 + (1.0 - a2) * cosine_in * cosine_in);
     float smith_out = cosine_in * sqrt(a2 + (1.0 - a2) * cosine_out * cosine_out);
-    return distribution * 0.5 * cosine_in / (smith_in + smith_out);
+    return distribution * 0.5 * cosine_in / max(smith_in + smith_out, 1e-30);
 }
 
 vec3 specular_at(vec4 position_ws_mm, vec4 normal_and_roughness)
@@ -26,7 +26,7 @@ vec3 specular_at(vec4 position_ws_mm, vec4 normal_and_roughness)
     float cosine_in = dot(normal_ws, to_light), cosine_out = dot(normal_ws, to_eye);
     if (normal_and_roughness.w <= 0.0 || cosine_in <= 0.0 || cosine_out <= 0.0)
         return vec3(0.0);
-    vec3 middle = normalize(to_light + to_eye);
+    vec3 middle = unit_or(to_light + to_eye, normal_ws);
     float reflectance = fresnel_reflectance(medium_eta(position_ws_mm.w), clamp(dot(to_light, middle), 0.0, 1.0));
     float lobe = ggx(normal_and_roughness.w, dot(normal_ws, middle), cosine_in, cosine_out);
     return light_irradiance(position_ws_mm.xyz) * reflectance * lobe *

@@ -1,6 +1,7 @@
 // Pass surface_resolve: one surface for each pixel, even where objects are thinner than a pixel: that of the
 // first of its points that shows an object, at the middle of all points that show the same; and its depth, 0
 // where no object is.
+#include "common/direction.glsl"
 #include "common/same_surface.glsl"
 uniform sampler2DMS surface_position_mm;
 uniform sampler2DMS surface_normal;
@@ -43,7 +44,7 @@ void resolve(int first)
     rise_mm /= 2.0 * count;
     bool is_flat = length(rise_mm) < 0.05 * width_mm;
     position_out_mm = vec4(is_flat ? middle_mm + rise_mm : points_mm[nearest].xyz, first_mm.w);
-    normal_out = vec4(is_flat ? normalize(middle_normal) : normals[nearest].xyz, normals[first].w);
+    normal_out = vec4(is_flat ? unit_or(middle_normal, normals[first].xyz) : normals[nearest].xyz, normals[first].w);
 }
 
 void main()
