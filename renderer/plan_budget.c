@@ -148,7 +148,7 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     plan->truncation_epsilon = TRUNCATION_SHARE * plan->epsilon;
     plan->aliasing_epsilon = ALIASING_SHARE * plan->epsilon;
     plan->banding_epsilon = BANDING_SHARE * plan->epsilon;
-    plan->table_epsilon = TABLE_SHARE * plan->epsilon;
+    plan->table_epsilon = fmax(TABLE_SHARE * plan->epsilon, LUT_EPSILON_MIN);
     plan->spacing_mm = INFINITY;
     for (size_t m = 0; m < plan->media->count; m++)
         spend_on_medium(request, plan, m);

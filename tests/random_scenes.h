@@ -357,7 +357,7 @@ static inline void random_scene_init(struct random_scene *random, uint64_t seed,
                                      const struct random_shares *shares)
 {
     static const enum render_technique techniques[] = { RENDER_TECHNIQUE_AUTO, RENDER_TECHNIQUE_SPLAT,
-                                                        RENDER_TECHNIQUE_LAMBERT };
+                                                        RENDER_TECHNIQUE_LAMBERT, RENDER_TECHNIQUE_TSM };
     struct rng rng = { .seed = seed };
     memset(random, 0, sizeof *random);
     random->seed = seed;

@@ -91,7 +91,9 @@ static void check_plan(const struct random_scene *random, const struct render_pl
     check_media(plan, seed);
     check_passes(random, plan);
     assert_plan(plan->technique != RENDER_TECHNIQUE_AUTO);
-    assert_plan(isfinite(plan->error_predicted) && plan->error_predicted >= 0);
+    assert_plan(plan->error_predicted >= 0);
+    assert_plan(isfinite(plan->error_predicted) || plan->technique == RENDER_TECHNIQUE_TSM);
+    assert_plan(plan->table_epsilon >= LUT_EPSILON_MIN);
     assert_plan(isfinite(plan->r_max_mm) && plan->r_max_mm >= 0);
     assert_plan(isfinite(plan->r_max_px) && plan->r_max_px >= 0);
     assert_plan(isfinite(plan->spacing_mm) && plan->spacing_mm > 0);

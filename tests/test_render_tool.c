@@ -415,7 +415,7 @@ static struct io_image *draw_with(const char *prefix, const char *context, const
 static void all_contexts_give_the_same_picture(void **state)
 {
     (void)state;
-    static const char *const techniques[] = { "splat", "lambert" };
+    static const char *const techniques[] = { "splat", "lambert", "tsm" };
     static const char *const scenes[] = { "sphere.json", "many.json" };
     static const struct {
         const char *prefix, *name;
