@@ -148,50 +148,6 @@ static bool take_media(const struct render_request *request, struct render_plan 
                        scene->object_count);
 }
 
-/* Normal of a triangle, as long as its area; its first corner. */
-static void area_vector(const struct io_mesh *mesh, size_t triangle, double corner_mm[3],
-                        double area_mm2[3])
-{
-    double sides[2][3];
-    const float *const first = &mesh->positions[3 * (size_t)mesh->indices[3 * triangle]];
-    for (int k = 0; k < 3; k++)
-        corner_mm[k] = (double)first[k];
-    for (size_t i = 0; i < 2; i++) {
-        const float *const other = &mesh->positions[3 * (size_t)mesh->indices[3 * triangle + 1 + i]];
-        for (int k = 0; k < 3; k++)
-            sides[i][k] = (double)other[k] - corner_mm[k];
-    }
-    for (int k = 0; k < 3; k++)
-        area_mm2[k] = 0.5 * (sides[0][(k + 1) % 3] * sides[1][(k + 2) % 3] -
-                             sides[0][(k + 2) % 3] * sides[1][(k + 1) % 3]);
-}
-
-/* Of the mesh, whatever may be in the way. */
-static double facing_area_mm2(const struct io_mesh *mesh, const struct io_light *light)
-{
-    double sum_mm2 = 0;
-    for (size_t t = 0; t < mesh->triangle_count; t++) {
-        double corner_mm[3], area_mm2[3], to_light[3];
-        area_vector(mesh, t, corner_mm, area_mm2);
-        for (int k = 0; k < 3; k++)
-            to_light[k] =
-                light->kind == IO_LIGHT_POINT ? light->position_mm[k] - corner_mm[k] : -light->direction[k];
-        if (render_dot(area_mm2, to_light) > 0)
-            sum_mm2 += sqrt(render_dot(area_mm2, area_mm2));
-    }
-    return sum_mm2;
-}
-
-static double lit_area_mm2(const struct io_scene *scene, const struct io_mesh *mesh)
-{
-    double sum_mm2 = 0;
-    for (size_t i = 0; i < scene->light_count; i++) {
-        if (render_light_shines(&scene->lights[i]))
-            sum_mm2 += facing_area_mm2(mesh, &scene->lights[i]);
-    }
-    return sum_mm2;
-}
-
 /* Of the disc in the ball's rectangle. */
 static double pixels_of_ball(const struct render_plan *plan, const double rectangle[4])
 {
@@ -228,7 +184,6 @@ static void look_at_objects(const struct render_request *request, struct render_
         plan->triangle_count += scene->objects[i].mesh->triangle_count;
         if (!object->is_visible)
             continue;
-        object->lit_area_mm2 = lit_area_mm2(scene, scene->objects[i].mesh);
         object->pixel_count = fmin(pixels_of_ball(plan, rectangle),
                                    pixels_of_area(plan, &object->ball, plan->media->area_mm2[i]));
         plan->covered_px += object->pixel_count;

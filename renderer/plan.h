@@ -120,7 +120,7 @@ struct render_plan_object {
     size_t medium;
     struct render_ball ball;
     bool is_visible;     /* some of it may be in the picture; what is not is no more than a blocker   */
-    double lit_area_mm2; /* of its surface that faces a light, light by light, whatever is in the way */
+    double lit_area_mm2; /* of its surface that may face a light, light by light                     */
     double pixel_count;  /* that it may cover, as a ball would                                       */
     double spacing_mm;   /* of its finest light samples                                              */
 };
