@@ -258,6 +258,15 @@ static bool is_converged(const struct reference *reference)
            report->error_predicted <= reference->wanted_error && report->spacing_mm <= reference->path_mm;
 }
 
+static void note_environment(struct reference *reference)
+{
+    struct render_report *const report = &reference->report;
+    if (reference->scene->has_environment)
+        snprintf(report->notes[report->note_count++], sizeof report->notes[0],
+                 "the environment \"%.120s\" is not drawn: no technique knows it yet",
+                 reference->scene->environment.path);
+}
+
 static void note_shortfall(struct reference *reference)
 {
     struct render_report *const report = &reference->report;
@@ -392,6 +401,7 @@ static void tone_map(struct reference *reference)
 
 static bool draw(struct reference *reference, dipole_status *status)
 {
+    note_environment(reference);
     if (!see(reference, status))
         return false;
     const char *const why_not = why_no_integral(reference);
