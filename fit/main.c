@@ -50,6 +50,10 @@ static bool job_read(const struct cli_tool *tool, const struct options *options,
     const dipole_place place = { .source = options->scene_path };
     if (job->scene->object_count == 0)
         return dipole_fail(status, DIPOLE_BAD_VALUE, &place, "the scene has no object to fit");
+    if (job->scene->has_environment)
+        return dipole_fail(
+            status, DIPOLE_NOT_SUPPORTED, &place,
+            "the scene has an environment, which cannot be fitted to, expected lights alone");
     job->material = job->scene->objects[0].material;
     if (!io_material_check_classical(&job->material, status))
         return false;

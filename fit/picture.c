@@ -66,7 +66,8 @@ static struct picture_errors picture_errors(const struct io_image *picture)
                                         .tile_error = UNSTATED_TILE_ERROR };
     const double spacing_mm = attribute_number(picture, "dipole:spacing_mm", 0.0);
     const double bound = spacing_mm > 0.0 ? attribute_number(picture, "dipole:table_error", epsilon) +
-                                                attribute_number(picture, "dipole:banding_error", 0.0)
+                                                attribute_number(picture, "dipole:banding_error", 0.0) +
+                                                attribute_number(picture, "dipole:blur_error", 0.0)
                                           : epsilon;
     const double deviation = hypot(bound * BOUND_TO_DEVIATION, PRECISION_ERROR);
     return (struct picture_errors){ .cut_mm = attribute_number(picture, "dipole:r_max_mm", INFINITY),

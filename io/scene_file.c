@@ -1,36 +1,29 @@
 #include "io/scene_file.h"
 
 #include "io/file.h"
-#include "io/json.h"
-#include "io/mesh_internal.h"
+#include "io/scene_internal.h"
 
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
-enum { LIGHT_LIMIT = 64, OBJECT_LIMIT = 1024, SIDE_LIMIT_PX = 16384, DEFAULT_DETAIL = 128 };
+enum { LIGHT_LIMIT = 64, OBJECT_LIMIT = 1024, DEFAULT_DETAIL = 128 };
 
-/* Ranges of what a scene may say: wide enough for anything, narrow enough that nothing overflows. */
-static const double LENGTH_MIN = 1e-6,
-                    LENGTH_MAX = 1e6; /* lengths and factors; coordinates to either side */
 static const double POWER_MAX = 1e12;
-static const double REACH_MAX_MM = 1e9; /* of a mesh, once it is in the world */
-
-static const double RAD_PER_DEG = 3.14159265358979323846 / 180;
 
 /* ---- vectors ------------------------------------------------------------------------------------- */
 
-static double length_of(const double v[3])
+double io_scene_length(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* False for a vector that is too short to have a direction. */
-static bool normalize(double v[3])
+bool io_scene_normalize(double v[3])
 {
-    const double length = length_of(v);
+    const double length = io_scene_length(v);
     if (!(length > 1e-12))
         return false;
     for (int axis = 0; axis < 3; axis++)
@@ -38,14 +31,14 @@ static bool normalize(double v[3])
     return true;
 }
 
-static bool get_coordinates(const struct io_json *object, const char *key, double out[3],
-                            dipole_status *status)
+bool io_scene_get_coordinates(const struct io_json *object, const char *key, double out[3],
+                              dipole_status *status)
 {
-    return io_json_get_numbers(object, key, 3, -LENGTH_MAX, LENGTH_MAX, out, status);
+    return io_json_get_numbers(object, key, 3, -IO_SCENE_LENGTH_MAX, IO_SCENE_LENGTH_MAX, out, status);
 }
 
 /* [r, g, b], or one number for grey. */
-static bool get_rgb(const struct io_json *object, const char *key, double out[3], dipole_status *status)
+bool io_scene_get_rgb(const struct io_json *object, const char *key, double out[3], dipole_status *status)
 {
     if (!json_is_number(io_json_member(object, key).value))
         return io_json_get_numbers(object, key, 3, 0, POWER_MAX, out, status);
@@ -55,79 +48,10 @@ static bool get_rgb(const struct io_json *object, const char *key, double out[3]
     return true;
 }
 
-static void scale_to_mm(double v[3], double unit_mm)
+void io_scene_scale_to_mm(double v[3], double unit_mm)
 {
     for (int axis = 0; axis < 3; axis++)
         v[axis] *= unit_mm;
-}
-
-/* ---- camera -------------------------------------------------------------------------------------- */
-
-static bool get_size(const struct io_json *at, struct io_camera *camera, dipole_status *status)
-{
-    const struct io_json size = io_json_member(at, "size");
-    double numbers[2] = { 800, 600 };
-    if (!io_json_get_numbers(at, "size", 2, 1, SIDE_LIMIT_PX, numbers, status))
-        return false;
-    for (size_t i = 0; i < 2; i++) {
-        const struct io_json element = io_json_element(&size, i);
-        if (numbers[i] != floor(numbers[i]))
-            return io_json_fail(&element, DIPOLE_BAD_VALUE, status, "is %g, expected a whole number",
-                                numbers[i]);
-    }
-    camera->width_px = (int)numbers[0];
-    camera->height_px = (int)numbers[1];
-    return true;
-}
-
-/* The eye sees something, and knows which way up is. */
-static bool check_view(const struct io_json *at, const struct io_camera *camera, dipole_status *status)
-{
-    const struct io_json target = io_json_member(at, "target"), up = io_json_member(at, "up");
-    double view[3], side[3], upward[3];
-    for (int axis = 0; axis < 3; axis++) {
-        view[axis] = camera->target_mm[axis] - camera->eye_mm[axis];
-        upward[axis] = camera->up[axis];
-    }
-    if (!normalize(view))
-        return io_json_fail(&target, DIPOLE_BAD_VALUE, status, "is where eye is, expected another point");
-    if (!normalize(upward))
-        return io_json_fail(&up, DIPOLE_BAD_VALUE, status, "is [0, 0, 0], expected a direction");
-    for (int axis = 0; axis < 3; axis++)
-        side[axis] =
-            view[(axis + 1) % 3] * upward[(axis + 2) % 3] - view[(axis + 2) % 3] * upward[(axis + 1) % 3];
-    return length_of(side) > 1e-6 || io_json_fail(&up, DIPOLE_BAD_VALUE, status,
-                                                  "is parallel to the view, expected another direction");
-}
-
-static bool read_camera(const struct io_json *at, double unit_mm, struct io_camera *camera,
-                        dipole_status *status)
-{
-    static const char *const known[] = { "eye", "target", "up", "fov_y_deg", "height", "size", NULL };
-    const struct io_json fov = io_json_member(at, "fov_y_deg");
-    const struct io_json height = io_json_member(at, "height");
-    double fov_y_deg = 35;
-    *camera = (struct io_camera){ .up = { 0, 1, 0 } };
-    if (!io_json_check_object(at, known, 2, status) ||
-        !get_coordinates(at, "eye", camera->eye_mm, status) ||
-        !get_coordinates(at, "target", camera->target_mm, status) ||
-        !get_coordinates(at, "up", camera->up, status) ||
-        !io_json_get_number(at, "fov_y_deg", 1, 170, &fov_y_deg, status) ||
-        !io_json_get_number(at, "height", LENGTH_MIN, LENGTH_MAX, &camera->height_mm, status) ||
-        !get_size(at, camera, status))
-        return false;
-    if (fov.value && height.value)
-        return io_json_fail(&height, DIPOLE_BAD_VALUE, status,
-                            "stands beside fov_y_deg, expected either that (perspective) or height "
-                            "(orthographic)");
-    camera->is_orthographic = height.value != NULL;
-    camera->fov_y_rad = camera->is_orthographic ? 0 : fov_y_deg * RAD_PER_DEG;
-    if (!check_view(at, camera, status))
-        return false;
-    scale_to_mm(camera->eye_mm, unit_mm);
-    scale_to_mm(camera->target_mm, unit_mm);
-    camera->height_mm *= unit_mm;
-    return true;
 }
 
 /* ---- lights -------------------------------------------------------------------------------------- */
@@ -146,142 +70,19 @@ static bool read_light(const struct io_json *at, double unit_mm, struct io_light
     *light = (struct io_light){ .kind = (enum io_light_kind)kind };
     if (kind == IO_LIGHT_POINT) {
         if (!io_json_check_object(at, point_keys, 3, status) ||
-            !get_coordinates(at, "position", light->position_mm, status) ||
-            !get_rgb(at, "intensity", light->rgb, status))
+            !io_scene_get_coordinates(at, "position", light->position_mm, status) ||
+            !io_scene_get_rgb(at, "intensity", light->rgb, status))
             return false;
-        scale_to_mm(light->position_mm, unit_mm);
+        io_scene_scale_to_mm(light->position_mm, unit_mm);
         return true;
     }
     if (!io_json_check_object(at, directional_keys, 3, status) ||
-        !get_coordinates(at, "direction", light->direction, status) ||
-        !get_rgb(at, "irradiance", light->rgb, status))
+        !io_scene_get_coordinates(at, "direction", light->direction, status) ||
+        !io_scene_get_rgb(at, "irradiance", light->rgb, status))
         return false;
     const struct io_json direction = io_json_member(at, "direction");
-    return normalize(light->direction) ||
+    return io_scene_normalize(light->direction) ||
            io_json_fail(&direction, DIPOLE_BAD_VALUE, status, "is [0, 0, 0], expected a direction");
-}
-
-/* ---- transforms ---------------------------------------------------------------------------------- */
-
-struct transform {
-    double fit_height; /* 0: as large as the mesh is */
-    double scale[3];
-    double rotation[3][3];
-    double translate[3];
-};
-
-/* [x, y, z], or one number for all. A negative factor mirrors; 0 would flatten. */
-static bool get_scale(const struct io_json *at, double out[3], dipole_status *status)
-{
-    const struct io_json scale = io_json_member(at, "scale");
-    const bool is_array = json_is_array(scale.value);
-    if (is_array ? !get_coordinates(at, "scale", out, status)
-                 : !io_json_get_number(at, "scale", -LENGTH_MAX, LENGTH_MAX, out, status))
-        return false;
-    for (size_t axis = 0; axis < 3; axis++) {
-        const struct io_json element = io_json_element(&scale, axis);
-        if (!is_array)
-            out[axis] = out[0];
-        if (!(fabs(out[axis]) >= LENGTH_MIN))
-            return io_json_fail(is_array ? &element : &scale, DIPOLE_BAD_VALUE, status,
-                                "is %g, expected 1e-06 to 1e+06, or the same below 0 to mirror", out[axis]);
-    }
-    return true;
-}
-
-/* Turn about x, then y, then z, counter-clockwise seen against the axis. */
-static void set_rotation(double out[3][3], const double deg[3])
-{
-    double s[3], c[3];
-    for (int axis = 0; axis < 3; axis++) {
-        s[axis] = sin(deg[axis] * RAD_PER_DEG);
-        c[axis] = cos(deg[axis] * RAD_PER_DEG);
-    }
-    const double rows[3][3] = {
-        { c[2] * c[1], c[2] * s[1] * s[0] - s[2] * c[0], c[2] * s[1] * c[0] + s[2] * s[0] },
-        { s[2] * c[1], s[2] * s[1] * s[0] + c[2] * c[0], s[2] * s[1] * c[0] - c[2] * s[0] },
-        { -s[1], c[1] * s[0], c[1] * c[0] },
-    };
-    memcpy(out, rows, sizeof rows);
-}
-
-static bool read_transform(const struct io_json *at, struct transform *transform, dipole_status *status)
-{
-    static const char *const known[] = { "fit_height", "scale", "rotate_deg", "translate", NULL };
-    double rotate_deg[3] = { 0, 0, 0 };
-    *transform = (struct transform){ .scale = { 1, 1, 1 } };
-    if (at->value &&
-        (!io_json_check_object(at, known, 0, status) ||
-         !io_json_get_number(at, "fit_height", LENGTH_MIN, LENGTH_MAX, &transform->fit_height, status) ||
-         !get_scale(at, transform->scale, status) ||
-         !get_coordinates(at, "rotate_deg", rotate_deg, status) ||
-         !get_coordinates(at, "translate", transform->translate, status)))
-        return false;
-    set_rotation(transform->rotation, rotate_deg);
-    return true;
-}
-
-/* Rotate v into three floats. */
-static void rotate(const struct transform *transform, const double v[3], double out[3])
-{
-    for (int row = 0; row < 3; row++)
-        out[row] = transform->rotation[row][0] * v[0] + transform->rotation[row][1] * v[1] +
-                   transform->rotation[row][2] * v[2];
-}
-
-/* Move a mesh from its own coordinates to the world's; normals by the inverse transpose. */
-static void apply(const struct transform *transform, double unit_mm, struct io_mesh *mesh)
-{
-    double origin[3] = { 0, 0, 0 }, fit = 1;
-    if (transform->fit_height > 0) {
-        fit = transform->fit_height / ((double)mesh->max[1] - (double)mesh->min[1]);
-        for (int axis = 0; axis < 3; axis++)
-            origin[axis] =
-                axis == 1 ? (double)mesh->min[1] : ((double)mesh->min[axis] + (double)mesh->max[axis]) / 2;
-    }
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
-        float *p = mesh->positions + 3 * i, *n = mesh->normals + 3 * i;
-        double position[3], normal[3], turned[3];
-        for (int axis = 0; axis < 3; axis++) {
-            position[axis] = ((double)p[axis] - origin[axis]) * fit * transform->scale[axis];
-            normal[axis] = (double)n[axis] / transform->scale[axis];
-        }
-        rotate(transform, position, turned);
-        for (int axis = 0; axis < 3; axis++)
-            p[axis] = (float)((turned[axis] + transform->translate[axis]) * unit_mm);
-        rotate(transform, normal, turned);
-        normalize(turned);
-        for (int axis = 0; axis < 3; axis++)
-            n[axis] = (float)turned[axis];
-    }
-    const bool is_mirrored = transform->scale[0] * transform->scale[1] * transform->scale[2] < 0;
-    for (size_t i = 0; i < mesh->triangle_count && is_mirrored; i++) {
-        const uint32_t corner = mesh->indices[3 * i + 1];
-        mesh->indices[3 * i + 1] = mesh->indices[3 * i + 2];
-        mesh->indices[3 * i + 2] = corner;
-    }
-    io_mesh_update_bounds(mesh);
-}
-
-static bool place_mesh(const struct io_json *at, const struct transform *transform, double unit_mm,
-                       struct io_mesh *mesh, dipole_status *status)
-{
-    const struct io_json at_transform = io_json_member(at, "transform");
-    const struct io_json fit_height = io_json_member(&at_transform, "fit_height");
-    const double extent = fmax(
-        (double)mesh->max[0] - (double)mesh->min[0],
-        fmax((double)mesh->max[1] - (double)mesh->min[1], (double)mesh->max[2] - (double)mesh->min[2]));
-    if (transform->fit_height > 0 && !((double)mesh->max[1] - (double)mesh->min[1] > 1e-6 * extent))
-        return io_json_fail(&fit_height, DIPOLE_BAD_VALUE, status,
-                            "is given, but the mesh has no height, expected scale instead");
-    apply(transform, unit_mm, mesh);
-    for (int axis = 0; axis < 3; axis++) {
-        const double reach_mm = fmax(fabs((double)mesh->min[axis]), fabs((double)mesh->max[axis]));
-        if (!(reach_mm <= REACH_MAX_MM))
-            return io_json_fail(at, DIPOLE_BAD_VALUE, status, "reaches to %g mm, expected at most %g mm",
-                                reach_mm, REACH_MAX_MM);
-    }
-    return true;
 }
 
 /* ---- objects ------------------------------------------------------------------------------------- */
@@ -380,7 +181,7 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
                                          "transform", "roughness", "specular",  NULL };
     const struct io_json material = io_json_member(at, "material"),
                          transform_at = io_json_member(at, "transform");
-    struct transform transform;
+    struct io_scene_transform transform;
     *object = (struct io_object){ .roughness = 0.3, .has_specular = true };
     if (!io_json_check_object(at, known, 1, status))
         return false;
@@ -392,22 +193,61 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
     return io_json_get_text(at, "name", object->name, sizeof object->name, status) &&
            io_json_get_number(at, "roughness", 0.05, 1, &object->roughness, status) &&
            io_json_get_bool(at, "specular", &object->has_specular, status) &&
-           read_transform(&transform_at, &transform, status) &&
+           io_scene_read_transform(&transform_at, &transform, status) &&
            read_material(&material, options, &object->material, status) &&
            read_shape(at, options, &object->mesh, status) &&
-           place_mesh(at, &transform, unit_mm, object->mesh, status);
+           io_scene_place_mesh(at, &transform, unit_mm, object->mesh, status);
 }
 
 /* ---- scenes -------------------------------------------------------------------------------------- */
+
+/* at: the path of a picture; it is looked for, not read. */
+static bool find_picture(const struct io_json *at, const struct io_scene_options *options,
+                         struct io_environment *environment, dipole_status *status)
+{
+    const char *const text = json_string_value(at->value);
+    const char *const dot = text ? strrchr(text, '.') : NULL;
+    struct stat found;
+    if (!text)
+        return io_json_fail(at, DIPOLE_BAD_VALUE, status,
+                            "is not a string, expected the path of a picture");
+    if (!dot || (strcmp(dot, ".exr") != 0 && strcmp(dot, ".hdr") != 0))
+        return io_json_fail(at, DIPOLE_BAD_VALUE, status,
+                            "is \"%.100s\", expected a path that ends in .exr or .hdr", text);
+    if (!resolve(at, options, environment->path, status))
+        return false;
+    return (stat(environment->path, &found) == 0 && S_ISREG(found.st_mode)) ||
+           io_json_fail(at, DIPOLE_BAD_VALUE, status, "is \"%.100s\", which is no file", text);
+}
+
+static bool read_environment(const struct io_json *at, const struct io_scene_options *options,
+                             struct io_scene *scene, dipole_status *status)
+{
+    static const char *const known[] = { "image", "scale", "rotate_deg", NULL };
+    const struct io_json image = io_json_member(at, "image");
+    double rotate_deg = 0;
+    if (!at->value)
+        return true;
+    scene->environment = (struct io_environment){ .rgb = { 1, 1, 1 } };
+    if (!io_json_check_object(at, known, 1, status) ||
+        !io_scene_get_rgb(at, "scale", scene->environment.rgb, status) ||
+        !io_json_get_number(at, "rotate_deg", -IO_SCENE_LENGTH_MAX, IO_SCENE_LENGTH_MAX, &rotate_deg,
+                            status) ||
+        !find_picture(&image, options, &scene->environment, status))
+        return false;
+    scene->environment.rotate_rad = rotate_deg * IO_SCENE_RAD_PER_DEG;
+    scene->has_environment = true;
+    return true;
+}
 
 static bool read_lights(const struct io_json *at, double unit_mm, struct io_scene *scene,
                         dipole_status *status)
 {
     size_t count;
-    if (!io_json_check_array(at, 1, LIGHT_LIMIT, &count, status))
+    if (!io_json_check_array(at, scene->has_environment ? 0 : 1, LIGHT_LIMIT, &count, status))
         return false;
-    scene->lights = calloc(count, sizeof *scene->lights);
-    if (!scene->lights)
+    scene->lights = count > 0 ? calloc(count, sizeof *scene->lights) : NULL;
+    if (count > 0 && !scene->lights)
         return io_json_fail(at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
     for (; scene->light_count < count; scene->light_count++) {
         const struct io_json light = io_json_element(at, scene->light_count);
@@ -457,17 +297,24 @@ static bool read_objects(const struct io_json *at, const struct io_scene_options
 static bool fill_scene(const struct io_json *root, const struct io_scene_options *options,
                        struct io_scene *scene, dipole_status *status)
 {
-    static const char *const known[] = { "camera",     "lights",      "objects", "unit_mm",
-                                         "background", "exposure_ev", NULL };
-    const struct io_json camera = io_json_member(root, "camera"), lights = io_json_member(root, "lights"),
+    static const char *const known[] = { "lights",     "objects",     "camera",      "cameras", "unit_mm",
+                                         "background", "exposure_ev", "environment", "frames",  NULL };
+    const struct io_json environment = io_json_member(root, "environment"),
+                         lights = io_json_member(root, "lights"), frames = io_json_member(root, "frames"),
                          objects = io_json_member(root, "objects");
     double unit_mm = 1;
-    return io_json_check_object(root, known, 3, status) &&
-           io_json_get_number(root, "unit_mm", LENGTH_MIN, LENGTH_MAX, &unit_mm, status) &&
-           get_rgb(root, "background", scene->background, status) &&
-           io_json_get_number(root, "exposure_ev", -100, 100, &scene->exposure_ev, status) &&
-           read_camera(&camera, unit_mm, &scene->camera, status) &&
-           read_lights(&lights, unit_mm, scene, status) &&
+    if (!io_json_check_object(root, known, 2, status) ||
+        !io_json_get_number(root, "unit_mm", IO_SCENE_LENGTH_MIN, IO_SCENE_LENGTH_MAX, &unit_mm, status) ||
+        !io_scene_get_rgb(root, "background", scene->background, status) ||
+        !io_json_get_number(root, "exposure_ev", -100, 100, &scene->exposure_ev, status) ||
+        !io_scene_read_cameras(root, options->camera_name, unit_mm, &scene->camera, status))
+        return false;
+    if (options->width_px > 0)
+        scene->camera.width_px = options->width_px;
+    if (options->height_px > 0)
+        scene->camera.height_px = options->height_px;
+    return read_environment(&environment, options, scene, status) &&
+           read_lights(&lights, unit_mm, scene, status) && io_scene_read_frames(&frames, scene, status) &&
            read_objects(&objects, options, unit_mm, scene, status);
 }
 
@@ -493,10 +340,6 @@ bool io_scene_read(const char *path, const struct io_scene_options *options, str
         io_scene_destroy(scene);
         return false;
     }
-    if (options->width_px > 0)
-        scene->camera.width_px = options->width_px;
-    if (options->height_px > 0)
-        scene->camera.height_px = options->height_px;
     *scene_out = scene;
     return true;
 }
@@ -509,5 +352,6 @@ void io_scene_destroy(struct io_scene *scene)
         io_mesh_destroy(scene->objects[i].mesh);
     free(scene->objects);
     free(scene->lights);
+    free(scene->frames.lights);
     free(scene);
 }

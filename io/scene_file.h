@@ -23,6 +23,21 @@ struct io_camera {
     int width_px, height_px;
 };
 
+/* Light from all around: a picture of radiance by direction. The picture itself is not read here. */
+struct io_environment {
+    char path[4096];   /* of an EXR or HDR file, resolved; it exists      */
+    double rgb[3];     /* what the picture is multiplied by, finite, >= 0 */
+    double rotate_rad; /* about y, counter-clockwise seen from above      */
+};
+
+/* A scene in motion. Without frames count is 1 and the turns are 0. */
+struct io_frames {
+    int count;
+    double camera_turn_deg, lights_turn_deg; /* from frame 0 to frame count */
+    struct io_camera camera;                 /* as read: every frame is made */
+    struct io_light *lights;                 /* of these                     */
+};
+
 struct io_object {
     char name[128];
     struct io_mesh *mesh; /* positions in mm, in the world: transform and unit applied */
@@ -33,25 +48,37 @@ struct io_object {
 
 struct io_scene {
     char path[4096];
-    struct io_camera camera;
-    double exposure_ev;   /* PNG only: radiance times 2^ev                    */
-    double background[3]; /* radiance where no object is                      */
+    struct io_camera camera; /* of frame 0, as are the lights, until io_scene_set_frame */
+    double exposure_ev;      /* PNG only: radiance times 2^ev                       */
+    double background[3];    /* radiance where no object is                         */
     struct io_light *lights;
-    size_t light_count;
+    size_t light_count; /* 0 only with an environment                          */
+    bool has_environment;
+    struct io_environment environment;
     struct io_object *objects;
     size_t object_count;
     double min_mm[3], max_mm[3];
+    struct io_frames frames;
 };
 
 struct io_scene_options {
     const char *const *allowed_paths; /* folders that references may lead to, beside the scene's own */
     size_t allowed_path_count;
+    const char *camera_name; /* which of the cameras; NULL: the first                 */
     int width_px, height_px; /* override the camera's, when > 0                       */
 };
 
 /* Read a scene, its meshes and materials. End it with io_scene_destroy. */
 DIPOLE_CHECKED bool io_scene_read(const char *path, const struct io_scene_options *options,
                                   struct io_scene **scene_out, dipole_status *status);
+
+/*
+ * Set the camera and the lights of a scene that was read to those of a frame, 0 to frames.count - 1. Each
+ * frame is computed from what was read: frame 0 is the file to the last bit, whatever was set before.
+ * Counter-clockwise seen against the axis: the camera turns about its up through its target, the lights
+ * about y through the target.
+ */
+void io_scene_set_frame(struct io_scene *scene, int frame);
 
 void io_scene_destroy(struct io_scene *scene);
 

@@ -191,6 +191,24 @@ void lut_tsm_local_depth_factor(const struct lut_tsm *lut, double dz_mm, double 
 DIPOLE_CHECKED bool lut_tsm_audit(const struct lut_tsm *lut, int depth_count, unsigned seed,
                                   struct lut_error *error_out, dipole_status *status);
 
+/*
+ * What the volume was baked from, for those who evaluate the response themselves: of sample i it is the
+ * form of T30 at the cell's centre, |D|^2 = offset^2 + dz^2, times a factor of dz. End it with
+ * lut_tsm_exact_destroy.
+ */
+struct lut_tsm_exact {
+    dipole_sources sources[IO_CHANNEL_COUNT];
+    int node_count; /* of depth: dz = depth_scale sinh(v asinh(depth_max/depth_scale)), v = 2k/(node_count -
+                     * 1) - 1
+                     */
+    float *rgb;     /* sample_count rows of node_count factors */
+};
+
+/* node_count 2 to 65536. Fails with DIPOLE_OUT_OF_MEMORY or as lut_tsm_bake does. */
+DIPOLE_CHECKED bool lut_tsm_exact_create(const struct lut_tsm *lut, int node_count,
+                                         struct lut_tsm_exact **exact_out, dipole_status *status);
+void lut_tsm_exact_destroy(struct lut_tsm_exact *exact);
+
 /* Picture and file, as of splat tables. */
 DIPOLE_CHECKED bool lut_tsm_to_image(const struct lut_tsm *lut, struct io_image **image_out,
                                      dipole_status *status);

@@ -5,9 +5,11 @@
 #ifndef RENDERER_BANDS_H
 #define RENDERER_BANDS_H
 
-#include "lutgen/lut.h"
+#include "renderer/media.h"
 
-enum { RENDER_BAND_LIMIT = 8 };
+/* Nodes of a table: steps of less than 0.2 % of the distance, which interpolation errs by some 1e-5 of the
+ * profile for. */
+enum { RENDER_BAND_LIMIT = 8, RENDER_BAND_NODES = 8193 };
 
 struct render_band {
     double spacing_mm;             /* of the light samples that it is summed over      */
@@ -27,14 +29,23 @@ int render_bands_make(double spacing_mm, double r_max_mm, double ring_spacings,
 /* Part of the profile that the band carries at r_mm, 0 to 1; the bands' weights add to 1. */
 double render_band_weight(const struct render_band *band, double r_mm);
 
+/* Where a medium's profile comes from: a row of a table, and where a channel's blur_mm > 0 its average
+ * by footprint.h. */
+struct render_band_source {
+    const struct lut_splat *table;
+    size_t row;
+    const struct render_medium *medium;
+    double blur_mm[IO_CHANNEL_COUNT];
+};
+
 /* The axis of the bands' own tables: in the logarithm (power 0), with nodes as dense as the weights need.
  */
-struct lut_axis render_bands_axis(const struct lut_splat *table);
+struct lut_axis render_bands_axis(const struct render_band_source *source);
 
-/*
- * Each band's table, R G B 0 per node on that axis: band after band, node_count x 4 floats
- * each. The caller frees it; NULL: no memory.
- */
-float *render_bands_bake(const struct lut_splat *table, const struct render_band *bands, int band_count);
+/* Each band's table on that axis: R G B 0 per node, band after band, node_count x 4 floats each.
+ * Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_bands_bake(const struct render_band_source *source,
+                                      const struct render_band *bands, int band_count, float *rgb,
+                                      dipole_status *status);
 
 #endif

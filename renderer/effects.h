@@ -5,11 +5,21 @@
 #include "renderer/plan.h"
 
 extern const struct render_effect render_effect_surface;
+extern const struct render_effect render_effect_object_ids;
 extern const struct render_effect render_effect_light_view;
 extern const struct render_effect render_effect_light_samples;
 extern const struct render_effect render_effect_specular;
 extern const struct render_effect render_effect_lambert;
 extern const struct render_effect render_effect_splat;
+extern const struct render_effect render_effect_overlap;
+extern const struct render_effect render_effect_tsm_table;
+extern const struct render_effect render_effect_tsm_exact;
+extern const struct render_effect render_effect_tsm_light;
+extern const struct render_effect render_effect_tsm_peel;
+extern const struct render_effect render_effect_tsm_global;
+extern const struct render_effect render_effect_tsm_local;
+extern const struct render_effect render_effect_tsm_texels;
+extern const struct render_effect render_effect_tsm_vertex;
 extern const struct render_effect render_effect_composite;
 extern const struct render_effect render_effect_capture;
 extern const struct render_effect render_effect_tone_map;

@@ -1,11 +1,17 @@
-# Write the shader files of FOLDER into one C file OUTPUT, as bytes: cmake -DFOLDER= -DOUTPUT= -P this
+# Write the shader files of FOLDER, and lutgen/tsm.glsl from the folder TABLES, into one C file OUTPUT, as bytes:
+# cmake -DFOLDER= -DTABLES= -DOUTPUT= -P this
 file(GLOB_RECURSE paths RELATIVE ${FOLDER} ${FOLDER}/*.vert ${FOLDER}/*.frag ${FOLDER}/*.glsl)
+list(APPEND paths lutgen/tsm.glsl)
 list(SORT paths)
 set(arrays "")
 set(rows "")
 set(index 0)
 foreach(path IN LISTS paths)
-  file(READ ${FOLDER}/${path} bytes HEX)
+  if(path STREQUAL "lutgen/tsm.glsl")
+    file(READ ${TABLES}/tsm.glsl bytes HEX)
+  else()
+    file(READ ${FOLDER}/${path} bytes HEX)
+  endif()
   string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")
   string(APPEND arrays "static const char text_${index}[] = { ${bytes}0 };\n")
   string(APPEND rows "    { \"${path}\", text_${index} },\n")

@@ -1,5 +1,8 @@
 #include "renderer/execute.h"
 
+#include "renderer/splat_draw.h"
+#include "renderer/tsm_draw.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,13 +11,12 @@
 
 enum {
     SAMPLES_PER_PIXEL = 4,
-    PROGRAM_LIMIT = 32,
-    TEXTURE_LIMIT = 24,
+    PROGRAM_LIMIT = 64,
+    TEXTURE_LIMIT = 48,
     DEFINES_SIZE = 256,
-    /* Units of the buffers; textures that a pass reads take those from 0. */
-    UNIT_SAMPLES = 14,
-    UNIT_TABLE = 15,
 };
+
+#define PI 3.14159265358979323846
 
 struct program {
     const struct render_pass *pass;
@@ -30,30 +32,27 @@ struct texture {
     bool is_written; /* by a pass of the plan that runs */
 };
 
-/* A buffer that shaders read as a texture. */
-struct buffer_texture {
-    GLuint buffer, texture;
-};
-
 /* One object's arrays. */
 struct mesh {
     GLuint vertex_array, buffers[3];
     GLsizei index_count;
-    double roughness; /* 0: no gloss */
+    size_t first_vertex; /* counted over all meshes */
+    double roughness;    /* 0: no gloss */
 };
 
 struct render_executor {
     struct render_gl_errors *errors;
     struct mesh *meshes;
     size_t mesh_count;
-    GLuint empty_vertex_array, splat_vertex_array, splat_buffer;
+    GLuint empty_vertex_array;
     struct program programs[PROGRAM_LIMIT];
     size_t program_count;
     struct texture textures[TEXTURE_LIMIT];
     size_t texture_count;
-    struct buffer_texture sample_buffer, table_buffer;
-    struct render_light_samples samples[RENDER_BAND_LIMIT]; /* of each band */
-    size_t splat_count;
+    size_t draw_counts[RENDER_EFFECT_LIMIT];
+    struct render_splatter *splatter;           /* NULL until light is first sampled */
+    struct render_tsm *tsm;                     /* NULL until a shadow map is first gathered */
+    struct render_buffer_texture object_buffer; /* of render_executor_fill_media     */
 };
 
 static double now_ms(void)
@@ -87,36 +86,11 @@ static void mesh_create(struct mesh *mesh, const struct io_object *object)
     mesh->roughness = object->has_specular ? object->roughness : 0;
 }
 
-static void splat_array_create(struct render_executor *executor)
+/* A texture that a pass keeps by itself is not ours to delete. */
+static void texture_end(const struct texture *texture)
 {
-    const GLuint array_count = 1;
-    glCreateVertexArrays((GLsizei)array_count, &executor->splat_vertex_array);
-    const GLuint array = executor->splat_vertex_array;
-    glVertexArrayAttribFormat(array, 0, 4, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, rectangle));
-    glVertexArrayAttribFormat(array, 1, 1, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, depth));
-    glVertexArrayAttribIFormat(array, 2, 2, GL_UNSIGNED_INT, offsetof(struct render_splat, first));
-    glVertexArrayAttribFormat(array, 3, 4, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, centre_mm));
-    glVertexArrayBindingDivisor(array, 0, 1);
-    for (GLuint i = 0; i < 4; i++) {
-        glVertexArrayAttribBinding(array, i, 0);
-        glEnableVertexArrayAttrib(array, i);
-    }
-}
-
-static void buffer_texture_destroy(struct buffer_texture *buffer)
-{
-    glDeleteTextures(1, &buffer->texture);
-    glDeleteBuffers(1, &buffer->buffer);
-    *buffer = (struct buffer_texture){ 0 };
-}
-
-static void buffer_texture_fill(struct buffer_texture *buffer, GLenum format, const void *data, size_t size)
-{
-    buffer_texture_destroy(buffer);
-    glCreateBuffers(1, &buffer->buffer);
-    glNamedBufferStorage(buffer->buffer, (GLsizeiptr)size, data, 0);
-    glCreateTextures(GL_TEXTURE_BUFFER, 1, &buffer->texture);
-    glTextureBuffer(buffer->texture, format, buffer->buffer);
+    if (texture->kind->format != RENDER_OTHER && texture->handle)
+        glDeleteTextures(1, &texture->handle);
 }
 
 bool render_executor_create(const struct io_scene *scene, struct render_gl_errors *errors,
@@ -134,10 +108,13 @@ bool render_executor_create(const struct io_scene *scene, struct render_gl_error
     executor->errors = errors;
     executor->meshes = meshes;
     executor->mesh_count = scene->object_count;
-    for (size_t i = 0; i < scene->object_count; i++)
+    size_t vertex_count = 0;
+    for (size_t i = 0; i < scene->object_count; i++) {
         mesh_create(&meshes[i], &scene->objects[i]);
+        meshes[i].first_vertex = vertex_count;
+        vertex_count += scene->objects[i].mesh->vertex_count;
+    }
     glCreateVertexArrays(1, &executor->empty_vertex_array);
-    splat_array_create(executor);
     if (!render_gl_check(errors, "upload of the meshes", status)) {
         render_executor_destroy(executor);
         return false;
@@ -157,38 +134,41 @@ void render_executor_destroy(struct render_executor *executor)
     for (size_t i = 0; i < executor->program_count; i++)
         glDeleteProgram(executor->programs[i].handle);
     for (size_t i = 0; i < executor->texture_count; i++)
-        glDeleteTextures(1, &executor->textures[i].handle);
-    buffer_texture_destroy(&executor->sample_buffer);
-    buffer_texture_destroy(&executor->table_buffer);
-    glDeleteBuffers(1, &executor->splat_buffer);
-    glDeleteVertexArrays(1, &executor->splat_vertex_array);
+        texture_end(&executor->textures[i]);
+    render_splatter_destroy(executor->splatter);
+    render_tsm_destroy(executor->tsm);
+    render_buffer_texture_destroy(&executor->object_buffer);
     glDeleteVertexArrays(1, &executor->empty_vertex_array);
-    for (int b = 0; b < RENDER_BAND_LIMIT; b++)
-        render_light_samples_destroy(&executor->samples[b]);
     free(executor->meshes);
     free(executor);
 }
 
 /* ---- programs ----------------------------------------------------------------------------------- */
 
-/* "#define HAS_RADIOSITY\n" and the like, for each optional texture that the plan writes. */
+/* Append "#define HAS_RADIOSITY\n" or the like. */
+static void add_define(const char *texture, char defines[DEFINES_SIZE])
+{
+    const size_t used = strlen(defines);
+    char name[48];
+    size_t i = 0;
+    for (; texture[i] && i + 1 < sizeof name; i++)
+        name[i] = texture[i] >= 'a' && texture[i] <= 'z' ? (char)(texture[i] - 'a' + 'A') : texture[i];
+    name[i] = '\0';
+    snprintf(defines + used, DEFINES_SIZE - used, "#define HAS_%s\n", name);
+}
+
+/* One for each optional texture that is read or written under this plan. */
 static void list_defines(const struct render_plan *plan, const struct render_pass *pass,
                          char defines[DEFINES_SIZE])
 {
-    int used = 0;
-    defines[0] = '\0';
+    memset(defines, 0, DEFINES_SIZE);
     for (size_t r = 0; r < RENDER_PASS_READS && pass->reads_if_written[r]; r++) {
-        if (!render_plan_writes(plan, pass->reads_if_written[r]))
-            continue;
-        char name[48];
-        size_t i = 0;
-        for (; pass->reads_if_written[r][i] && i + 1 < sizeof name; i++) {
-            const char c = pass->reads_if_written[r][i];
-            name[i] = c >= 'a' && c <= 'z' ? (char)(c - 'a' + 'A') : c;
-        }
-        name[i] = '\0';
-        if (used < DEFINES_SIZE)
-            used += snprintf(defines + used, DEFINES_SIZE - (size_t)used, "#define HAS_%s\n", name);
+        if (render_plan_writes(plan, pass->reads_if_written[r]))
+            add_define(pass->reads_if_written[r], defines);
+    }
+    for (size_t i = 0; i < RENDER_PASS_EXTRAS && pass->writes_if_wanted[i]; i++) {
+        if (render_plan_wants(plan, pass->writes_if_wanted[i]))
+            add_define(pass->writes_if_wanted[i], defines);
     }
 }
 
@@ -248,8 +228,18 @@ static void texture_size(const struct render_plan *plan, const struct render_tex
         for (size_t v = 0; v < plan->view_count; v++)
             largest = plan->views[v].size_px > largest ? plan->views[v].size_px : largest;
         *width_px = *height_px = largest;
+    } else if (kind->size == RENDER_SIZE_MAP) {
+        *width_px = *height_px = render_plan_map_side_px(plan);
+    } else if (kind->size == RENDER_SIZE_VERTICES) {
+        *width_px = RENDER_VERTEX_ROW;
+        *height_px = (int)((plan->vertex_count + RENDER_VERTEX_ROW - 1) / RENDER_VERTEX_ROW);
     }
 }
+
+static const GLenum formats[] = { [RENDER_RGBA32F] = GL_RGBA32F,
+                                  [RENDER_R32F] = GL_R32F,
+                                  [RENDER_DEPTH32F] = GL_DEPTH_COMPONENT32F,
+                                  [RENDER_OTHER] = GL_NONE };
 
 /* Make a texture that the plan writes, or take the one there is when its size still fits. */
 static bool texture_want(struct render_executor *executor, const struct render_plan *plan, const char *name,
@@ -266,20 +256,28 @@ static bool texture_want(struct render_executor *executor, const struct render_p
     int width_px, height_px;
     texture_size(plan, kind, &width_px, &height_px);
     texture->is_used = true;
-    if (kind->format == RENDER_ON_CPU ||
+    if (kind->format == RENDER_OTHER ||
         (texture->handle && texture->width_px == width_px && texture->height_px == height_px))
         return true;
     glDeleteTextures(1, &texture->handle);
-    const GLenum format = kind->format == RENDER_DEPTH32F ? GL_DEPTH_COMPONENT32F : GL_RGBA32F;
+    const GLenum format = formats[kind->format];
     if (kind->is_multisampled) {
         glCreateTextures(GL_TEXTURE_2D_MULTISAMPLE, 1, &texture->handle);
         glTextureStorage2DMultisample(texture->handle, SAMPLES_PER_PIXEL, format, width_px, height_px,
                                       GL_TRUE);
     } else {
         glCreateTextures(GL_TEXTURE_2D, 1, &texture->handle);
-        glTextureStorage2D(texture->handle, 1, format, width_px, height_px);
-        glTextureParameteri(texture->handle, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-        glTextureParameteri(texture->handle, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+        const int largest_px = width_px > height_px ? width_px : height_px;
+        const int levels = kind->is_mipmapped ? (int)log2(largest_px) + 1 : 1;
+        glTextureStorage2D(texture->handle, levels, format, width_px, height_px);
+        glTextureParameteri(texture->handle, GL_TEXTURE_MIN_FILTER,
+                            kind->is_mipmapped ? GL_LINEAR_MIPMAP_LINEAR : GL_NEAREST);
+        glTextureParameteri(texture->handle, GL_TEXTURE_MAG_FILTER,
+                            kind->is_mipmapped ? GL_LINEAR : GL_NEAREST);
+        if (kind->is_mipmapped) { /* 0 outside */
+            glTextureParameteri(texture->handle, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+            glTextureParameteri(texture->handle, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+        }
     }
     glObjectLabel(GL_TEXTURE, texture->handle, -1, name);
     texture->width_px = width_px;
@@ -294,8 +292,10 @@ static bool prepare_textures(struct render_executor *executor, const struct rend
         executor->textures[i].is_used = executor->textures[i].is_written = false;
     for (size_t i = 0; i < plan->pass_count; i++) {
         const struct render_pass *const pass = plan->passes[i].pass;
-        for (size_t w = 0; w < RENDER_PASS_WRITES && pass->writes[w]; w++) {
-            if (!texture_want(executor, plan, pass->writes[w], status))
+        const char *writes[RENDER_PASS_TARGETS + 1];
+        render_plan_list_writes(plan, pass, writes);
+        for (size_t w = 0; writes[w]; w++) {
+            if (!texture_want(executor, plan, writes[w], status))
                 return false;
         }
         if (pass->depth_written && !texture_want(executor, plan, pass->depth_written, status))
@@ -306,7 +306,7 @@ static bool prepare_textures(struct render_executor *executor, const struct rend
         if (executor->textures[i].is_used)
             executor->textures[kept++] = executor->textures[i];
         else
-            glDeleteTextures(1, &executor->textures[i].handle);
+            texture_end(&executor->textures[i]);
     }
     executor->texture_count = kept;
     return true;
@@ -318,103 +318,82 @@ GLuint render_executor_texture(const struct render_executor *executor, const cha
     return found ? found->handle : 0;
 }
 
-/* ---- light samples ------------------------------------------------------------------------------ */
-
-bool render_executor_sample_light_view(const struct render_frame *frame, dipole_status *status)
+void render_executor_hand_on(struct render_executor *executor, const char *texture, GLuint handle)
 {
-    const struct render_plan_view *const view = frame->view;
-    const size_t texel_count = (size_t)view->size_px * (size_t)view->size_px;
-    const struct io_light *const light = &frame->request->scene->lights[view->light];
-    float *const texels = malloc(texel_count * 4 * sizeof *texels);
-    if (!texels)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
-                           "no memory for a light's view of %d texels a side", view->size_px);
-    glGetTextureSubImage(render_executor_texture(frame->executor, "light_view"), 0, 0, 0, 0, view->size_px,
-                         view->size_px, 1, GL_RGBA, GL_FLOAT, (GLsizei)(texel_count * 4 * sizeof *texels),
-                         texels);
-    struct render_light_view reduced = { .texels = texels,
-                                         .size_px = view->size_px,
-                                         .levels = view->levels };
-    memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
-    memcpy(reduced.rgb, light->rgb, sizeof reduced.rgb);
-    const bool done = render_light_samples_append(&frame->executor->samples[0], &reduced,
-                                                  frame->plan->spacing_mm, status);
-    free(texels);
-    return done;
+    texture_find(executor, texture)->handle = handle;
 }
 
-static bool draw_band(const struct render_frame *frame, int band, dipole_status *status)
+/* ---- what is kept between frames ---------------------------------------------------------------- */
+
+bool render_executor_need_splatter(const struct render_frame *frame, struct render_splatter **splatter_out,
+                                   dipole_status *status)
 {
     struct render_executor *const executor = frame->executor;
-    const struct render_light_samples *const samples = &executor->samples[band];
-    const double reach_mm = frame->plan->bands[band].r_outer_mm;
-    struct render_splats splats;
-    if (!render_splats_create(samples, &frame->plan->camera, reach_mm, &splats, status))
+    if (!executor->splatter && !render_splatter_create(frame->plan->media, &executor->splatter, status))
         return false;
-    executor->splat_count += splats.count;
-    if (splats.count > 0) {
-        buffer_texture_fill(&executor->sample_buffer, GL_RGBA32F, samples->samples,
-                            samples->count * sizeof *samples->samples);
-        glBindTextureUnit(UNIT_SAMPLES, executor->sample_buffer.texture);
-        render_set_int(frame->program, "light_samples", UNIT_SAMPLES);
-        render_set_float(frame->program, "reach2_mm2", reach_mm * reach_mm);
-        glDeleteBuffers(1, &executor->splat_buffer);
-        glCreateBuffers(1, &executor->splat_buffer);
-        glNamedBufferStorage(executor->splat_buffer, (GLsizeiptr)(splats.count * sizeof *splats.splats),
-                             splats.splats, 0);
-        glVertexArrayVertexBuffer(executor->splat_vertex_array, 0, executor->splat_buffer, 0,
-                                  sizeof *splats.splats);
-        glBindVertexArray(executor->splat_vertex_array);
-        glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)splats.count);
-    }
-    render_splats_destroy(&splats);
+    *splatter_out = executor->splatter;
     return true;
 }
 
-static bool draw_splats(const struct render_frame *frame, const struct lut_splat *table,
-                        dipole_status *status)
+bool render_executor_need_tsm(const struct render_frame *frame, struct render_tsm **tsm_out,
+                              dipole_status *status)
 {
-    const struct render_plan *const plan = frame->plan;
-    const struct lut_axis axis = render_bands_axis(table);
-    const int node_count = axis.node_count;
-    const double end = axis.r_max_mm / axis.scale_mm;
-    float *const nodes = render_bands_bake(table, plan->bands, plan->band_count);
-    if (!nodes)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %d bands of %d nodes",
-                           plan->band_count, node_count);
-    buffer_texture_fill(&frame->executor->table_buffer, GL_RGBA32F, nodes,
-                        (size_t)plan->band_count * (size_t)node_count * 4 * sizeof *nodes);
-    free(nodes);
-    glBindTextureUnit(UNIT_TABLE, frame->executor->table_buffer.texture);
-    render_set_int(frame->program, "profile_table", UNIT_TABLE);
-    render_set_int(frame->program, "profile_last_node", node_count - 1);
-    render_set_float(frame->program, "profile_inverse_scale2", 1 / (axis.scale_mm * axis.scale_mm));
-    render_set_float(frame->program, "profile_nodes_per_log2", (node_count - 1) / log2(1 + end * end));
-    bool done = true;
-    for (int b = 0; done && b < plan->band_count; b++) {
-        struct render_light_samples *const samples = frame->executor->samples;
-        if (b > 0 &&
-            !render_light_samples_merge(&samples[b - 1], plan->bands[b].spacing_mm, &samples[b], status))
-            return false;
-        render_set_int(frame->program, "profile_first_node", b * node_count);
-        done = draw_band(frame, b, status);
+    struct render_executor *const executor = frame->executor;
+    if (!executor->tsm && !render_tsm_create(frame->plan->media, &executor->tsm, status))
+        return false;
+    *tsm_out = executor->tsm;
+    return true;
+}
+
+struct render_tsm *render_executor_tsm(const struct render_executor *executor)
+{
+    return executor->tsm;
+}
+
+struct render_splatter *render_executor_splatter(const struct render_executor *executor)
+{
+    return executor->splatter;
+}
+
+/* Two texels for each object: eta, exit scale per sr, r_max in mm, 0; and the diffuse reflectance. */
+bool render_executor_fill_media(const struct render_frame *frame, dipole_status *status)
+{
+    const size_t object_count = frame->request->scene->object_count;
+    float(*const texels)[2][4] = calloc(object_count, sizeof *texels);
+    if (!texels)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the media of %zu objects",
+                           object_count);
+    for (size_t i = 0; i < object_count; i++) {
+        const struct render_medium *const medium =
+            &frame->plan->media->media[frame->plan->objects[i].medium];
+        texels[i][0][0] = (float)medium->eta;
+        texels[i][0][1] = (float)(1 / (PI * dipole_fdt_outside(medium->eta)));
+        texels[i][0][2] = (float)frame->plan->of_medium[frame->plan->objects[i].medium].r_max_mm;
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            texels[i][1][c] = (float)medium->diffuse_reflectance[c];
     }
-    return done;
+    render_buffer_texture_fill(&frame->executor->object_buffer, GL_RGBA32F, texels,
+                               object_count * sizeof *texels);
+    render_executor_hand_on(frame->executor, "object_media", frame->executor->object_buffer.texture);
+    free(texels);
+    return true;
 }
 
-struct render_light_samples *render_executor_samples(struct render_executor *executor)
-{
-    return &executor->samples[0];
-}
-
-size_t render_executor_splat_count(const struct render_executor *executor)
-{
-    return executor->splat_count;
-}
+/* ---- counts ------------------------------------------------------------------------------------- */
 
 size_t render_executor_program_count(const struct render_executor *executor)
 {
     return executor->program_count;
+}
+
+size_t render_executor_draw_count(const struct render_executor *executor, size_t effect)
+{
+    return executor->draw_counts[effect];
+}
+
+void render_count_draw(const struct render_frame *frame)
+{
+    frame->executor->draw_counts[frame->effect]++;
 }
 
 /* ---- passes ------------------------------------------------------------------------------------- */
@@ -446,12 +425,15 @@ static void far_point(const struct render_plan_view *view, float value[4])
 static bool attach_targets(const struct render_frame *frame, const struct render_pass *pass,
                            GLuint framebuffer, dipole_status *status)
 {
-    GLenum buffers[RENDER_PASS_WRITES];
+    GLenum buffers[RENDER_PASS_TARGETS];
     GLsizei buffer_count = 0;
-    for (size_t w = 0; w < RENDER_PASS_WRITES && pass->writes[w]; w++) {
-        struct texture *const target = texture_find(frame->executor, pass->writes[w]);
+    const char *writes[RENDER_PASS_TARGETS + 1];
+    render_plan_list_writes(frame->plan, pass, writes);
+    for (size_t w = 0; writes[w]; w++) {
+        struct texture *const target = texture_find(frame->executor, writes[w]);
         const GLenum attachment = GL_COLOR_ATTACHMENT0 + (GLenum)w;
-        glNamedFramebufferTexture(framebuffer, attachment, target->handle, 0);
+        if (target->kind->format != RENDER_OTHER) /* else the pass attaches it by itself */
+            glNamedFramebufferTexture(framebuffer, attachment, target->handle, 0);
         buffers[buffer_count++] = attachment;
     }
     const char *const depth_name = pass->depth_written ? pass->depth_written : pass->depth_tested;
@@ -462,12 +444,12 @@ static bool attach_targets(const struct render_frame *frame, const struct render
     if (glCheckNamedFramebufferStatus(framebuffer, GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
         return dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL, "pass \"%s\": incomplete framebuffer",
                            pass->name);
-    for (size_t w = 0; w < RENDER_PASS_WRITES && pass->writes[w]; w++) {
-        struct texture *const target = texture_find(frame->executor, pass->writes[w]);
+    for (size_t w = 0; writes[w]; w++) {
+        struct texture *const target = texture_find(frame->executor, writes[w]);
         float value[4] = { 0, 0, 0, 0 };
-        if (target->kind->size == RENDER_SIZE_LIGHT_VIEW)
+        if (target->kind->is_far_where_empty && frame->view)
             far_point(frame->view, value);
-        if (!pass->is_added || !target->is_written)
+        if (target->kind->format != RENDER_OTHER && (!pass->is_added || !target->is_written))
             glClearNamedFramebufferfv(framebuffer, GL_COLOR, (GLint)w, value);
         target->is_written = true;
     }
@@ -481,10 +463,17 @@ static bool attach_targets(const struct render_frame *frame, const struct render
 static void set_state(const struct render_frame *frame, const struct render_pass *pass)
 {
     const struct render_texture *const target = render_texture_find(pass->writes[0]);
-    const bool is_light_view = target->size == RENDER_SIZE_LIGHT_VIEW;
-    glViewport(0, 0, is_light_view ? frame->view->size_px : frame->plan->width_px,
-               is_light_view ? frame->view->size_px : frame->plan->height_px);
-    (pass->is_added ? glEnable : glDisable)(GL_BLEND);
+    const bool is_map = target->size == RENDER_SIZE_MAP;
+    int width_px, height_px;
+    texture_size(frame->plan, target, &width_px, &height_px);
+    if (frame->view &&
+        (is_map || target->size == RENDER_SIZE_LIGHT_VIEW)) /* a part of a texture for the largest */
+        width_px = height_px = frame->view->size_px;
+    glViewport(0, 0, width_px, height_px);
+    /* What stands between the light and the object that a map is fitted to is in front of its near plane.
+     */
+    (is_map ? glEnable : glDisable)(GL_DEPTH_CLAMP);
+    (pass->is_added || pass->is_blended ? glEnable : glDisable)(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     (pass->depth_written || pass->depth_tested ? glEnable : glDisable)(GL_DEPTH_TEST);
     glDepthMask(pass->depth_written ? GL_TRUE : GL_FALSE);
@@ -492,18 +481,59 @@ static void set_state(const struct render_frame *frame, const struct render_pass
     glDisable(GL_CULL_FACE);
 }
 
-static void draw_scene(const struct render_frame *frame)
+void render_draw_object(const struct render_frame *frame, size_t object)
 {
-    for (size_t i = 0; i < frame->executor->mesh_count; i++) {
-        const struct mesh *const mesh = &frame->executor->meshes[i];
-        render_set_float(frame->program, "roughness", mesh->roughness);
-        glBindVertexArray(mesh->vertex_array);
-        glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
+    const struct mesh *const mesh = &frame->executor->meshes[object];
+    const struct render_plan *const plan = frame->plan;
+    const struct render_medium *const medium = &plan->media->media[plan->objects[object].medium];
+    render_set_float(frame->program, "roughness", mesh->roughness);
+    render_set_float(frame->program, "object", (double)(object + 1));
+    render_set_int(frame->program, "first_vertex", (int)mesh->first_vertex);
+    render_set_float(frame->program, "object_eta", medium->eta);
+    glBindVertexArray(mesh->vertex_array);
+    glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
+    render_count_draw(frame);
+}
+
+void render_draw_fullscreen(const struct render_frame *frame)
+{
+    glBindVertexArray(frame->executor->empty_vertex_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    render_count_draw(frame);
+}
+
+void render_bind_buffer(const struct render_frame *frame, const char *name, int unit,
+                        const struct render_buffer_texture *buffer)
+{
+    glBindTextureUnit((GLuint)unit, buffer->texture);
+    render_set_int(frame->program, name, unit);
+}
+
+static bool draw(const struct render_frame *frame, const struct render_pass *pass, dipole_status *status)
+{
+    if (pass->draw == RENDER_DRAW_BY_RUN)
+        return pass->run(frame, status);
+    if (pass->draw == RENDER_DRAW_FULLSCREEN) {
+        render_draw_fullscreen(frame);
+        return true;
+    }
+    for (size_t i = 0; i < frame->executor->mesh_count; i++)
+        render_draw_object(frame, i);
+    return true;
+}
+
+static void make_mipmaps(const struct render_frame *frame, const struct render_pass *pass)
+{
+    const char *writes[RENDER_PASS_TARGETS + 1];
+    render_plan_list_writes(frame->plan, pass, writes);
+    for (size_t w = 0; writes[w]; w++) {
+        const struct texture *const target = texture_find(frame->executor, writes[w]);
+        if (target->kind->is_mipmapped)
+            glGenerateTextureMipmap(target->handle);
     }
 }
 
-static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
-                     const struct lut_splat *table, dipole_status *status)
+static bool run_pass(struct render_frame *frame, const struct render_pass *pass, dipole_status *status)
 {
     struct render_executor *const executor = frame->executor;
     if (pass->draw == RENDER_DRAW_NOTHING)
@@ -520,15 +550,9 @@ static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
         bind_textures(frame, pass);
         if (pass->bind)
             pass->bind(frame);
-        if (pass->draw == RENDER_DRAW_SCENE) {
-            draw_scene(frame);
-        } else if (pass->draw == RENDER_DRAW_SPLATS) {
-            done = draw_splats(frame, table, status);
-        } else {
-            glBindVertexArray(executor->empty_vertex_array);
-            glDrawArrays(GL_TRIANGLES, 0, 3);
-        }
+        done = draw(frame, pass, status);
         glBindFramebuffer(GL_FRAMEBUFFER, 0);
+        make_mipmaps(frame, pass);
     }
     glDeleteFramebuffers(1, &framebuffer);
     glFinish(); /* timer queries are wrong by orders of magnitude on software renderers */
@@ -536,23 +560,31 @@ static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
 }
 
 bool render_executor_run(struct render_executor *executor, const struct render_request *request,
-                         const struct render_plan *plan, const struct lut_splat *table,
-                         double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
+                         const struct render_plan *plan, const struct render_table *tables,
+                         const struct lut_tsm *const *volumes, double time_ms[RENDER_EFFECT_LIMIT],
+                         dipole_status *status)
 {
     memset(time_ms, 0, RENDER_EFFECT_LIMIT * sizeof *time_ms);
-    for (int b = 0; b < RENDER_BAND_LIMIT; b++)
-        executor->samples[b].count = 0;
-    executor->splat_count = 0;
+    memset(executor->draw_counts, 0, sizeof executor->draw_counts);
+    if (executor->splatter)
+        render_splatter_begin(executor->splatter);
     if (!prepare_textures(executor, plan, status))
         return false;
     bool done = true;
     for (size_t i = 0; done && i < plan->pass_count; i++) {
         const struct render_plan_pass *const row = &plan->passes[i];
-        struct render_frame frame = { .executor = executor, .request = request, .plan = plan };
+        struct render_frame frame = { .executor = executor,
+                                      .request = request,
+                                      .plan = plan,
+                                      .tables = tables,
+                                      .volumes = volumes,
+                                      .effect = row->effect };
         if (row->pass->is_per_view)
             frame.view = &plan->views[row->view];
+        if (row->pass->is_per_map)
+            frame.view = &plan->maps[row->view];
         const double start_ms = now_ms();
-        done = run_pass(&frame, row->pass, table, status);
+        done = run_pass(&frame, row->pass, status);
         time_ms[row->effect] += now_ms() - start_ms;
     }
     return done;

@@ -4,17 +4,21 @@
 
 #include "renderer/gl.h"
 #include "renderer/plan.h"
-#include "renderer/splats.h"
 
 struct render_executor;
+struct render_splatter;
+struct render_tsm;
 
 /* What a pass sees when its bind or run function is called. */
 struct render_frame {
     struct render_executor *executor;
     const struct render_request *request;
     const struct render_plan *plan;
-    const struct render_plan_view *view; /* of passes per view, else NULL */
-    GLuint program;                      /* 0 when nothing is drawn       */
+    const struct render_table *tables;    /* of each medium, when the plan splats */
+    const struct lut_tsm *const *volumes; /* of each medium, when the plan has maps */
+    const struct render_plan_view *view;  /* of passes per view or map, else NULL */
+    size_t effect;                        /* that the pass is of                  */
+    GLuint program;                       /* 0 when nothing is drawn              */
 };
 
 /* Takes the scene's meshes to the context. End it with render_executor_destroy, context current. */
@@ -23,12 +27,14 @@ DIPOLE_CHECKED bool render_executor_create(const struct io_scene *scene, struct 
 void render_executor_destroy(struct render_executor *executor);
 
 /*
- * Run the passes in order; time_ms[e] of each effect of the plan is set. table: needed when the plan
- * splats, else NULL. Fails with DIPOLE_NOT_SUPPORTED or DIPOLE_OUT_OF_MEMORY.
+ * Run the passes in order; time_ms[e] of each effect of the plan is set. tables: one for each medium,
+ * needed when the plan splats, else NULL; volumes: the same when it has maps. Fails with
+ * DIPOLE_NOT_SUPPORTED or DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_executor_run(struct render_executor *executor,
                                         const struct render_request *request,
-                                        const struct render_plan *plan, const struct lut_splat *table,
+                                        const struct render_plan *plan, const struct render_table *tables,
+                                        const struct lut_tsm *const *volumes,
                                         double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status);
 
 /* Copy a texture of the frame's size, RGBA, rows from the top. */
@@ -38,22 +44,49 @@ DIPOLE_CHECKED bool render_executor_read(struct render_executor *executor, const
 /* OpenGL's name of a texture; 0 when no pass has asked for it. */
 GLuint render_executor_texture(const struct render_executor *executor, const char *texture);
 
-/* How many programs were compiled so far. */
+/* How many programs were compiled so far; how many draw calls an effect made in the last run. */
 size_t render_executor_program_count(const struct render_executor *executor);
+size_t render_executor_draw_count(const struct render_executor *executor, size_t effect);
 
-/* What the last run sampled, at the finest. */
-struct render_light_samples *render_executor_samples(struct render_executor *executor);
-size_t render_executor_splat_count(const struct render_executor *executor);
+/* The state of the splats; NULL before a plan that needs light samples has run. */
+struct render_splatter *render_executor_splatter(const struct render_executor *executor);
 
-/* For bind functions (passes/shared.c): a light, its view, the camera, and how radiosity leaves. */
+/* ---- for bind and run functions ----------------------------------------------------------------- */
+
+/* Uniforms that several passes share (passes/shared.c): a light, its view, the camera, and how radiosity
+ * leaves the one medium there is (common/medium.glsl). */
 void render_set_light(GLuint program, const struct io_light *light);
 void render_set_light_view(GLuint program, const struct render_request *request,
                            const struct render_plan_view *view);
 void render_set_camera(GLuint program, const struct render_plan *plan);
-void render_set_exit(GLuint program, const struct render_plan *plan);
+void render_set_medium(GLuint program, const struct render_plan *plan);
 
-/* For run functions: reduce the light's view that was just drawn to samples. */
-DIPOLE_CHECKED bool render_executor_sample_light_view(const struct render_frame *frame,
-                                                      dipole_status *status);
+/* Say that a draw call was made. Functions that draw by themselves call it. */
+void render_count_draw(const struct render_frame *frame);
+
+/* Draw one object, or a triangle over the whole target. */
+void render_draw_object(const struct render_frame *frame, size_t object);
+void render_draw_fullscreen(const struct render_frame *frame);
+
+/* Let the shader read a buffer, or a texture that a pass keeps by itself. */
+void render_bind_buffer(const struct render_frame *frame, const char *name, int unit,
+                        const struct render_buffer_texture *buffer);
+
+/* The texture (RENDER_OTHER) that passes read by that name from now on; its maker ends it. */
+void render_executor_hand_on(struct render_executor *executor, const char *texture, GLuint handle);
+
+/* Make what is kept between frames, when it is first needed. */
+DIPOLE_CHECKED bool render_executor_need_splatter(const struct render_frame *frame,
+                                                  struct render_splatter **splatter_out,
+                                                  dipole_status *status);
+
+DIPOLE_CHECKED bool render_executor_need_tsm(const struct render_frame *frame, struct render_tsm **tsm_out,
+                                             dipole_status *status);
+
+/* What was made; NULL before. */
+struct render_tsm *render_executor_tsm(const struct render_executor *executor);
+
+/* What each object is made of, for common/medium.glsl; handed on as object_media. */
+DIPOLE_CHECKED bool render_executor_fill_media(const struct render_frame *frame, dipole_status *status);
 
 #endif

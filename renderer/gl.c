@@ -165,6 +165,16 @@ static bool compile(const struct render_shader *shader, const char *defines, GLe
     return done;
 }
 
+/* They go, now that the program is linked. */
+static void detach_shaders(GLuint program)
+{
+    GLuint shaders[2];
+    GLsizei count = 0;
+    glGetAttachedShaders(program, 2, &count, shaders);
+    for (GLsizei i = 0; i < count; i++)
+        glDetachShader(program, shaders[i]);
+}
+
 bool render_program_create(const struct render_shader *vertex, const struct render_shader *fragment,
                            const char *defines, GLuint *program_out, dipole_status *status)
 {
@@ -184,10 +194,12 @@ bool render_program_create(const struct render_shader *vertex, const struct rend
                         fragment->name, (int)strcspn(log, "\n"), log);
         }
     }
-    if (done)
+    if (done) {
         *program_out = program;
-    else
+        detach_shaders(program);
+    } else {
         glDeleteProgram(program);
+    }
     return done;
 }
 
@@ -220,4 +232,25 @@ void render_set_matrix(GLuint program, const char *name, const struct render_pro
     float matrix[16];
     render_projection_matrix(projection, matrix);
     glProgramUniformMatrix4fv(program, glGetUniformLocation(program, name), 1, GL_FALSE, matrix);
+}
+
+/* ---- buffers ------------------------------------------------------------------------------------ */
+
+void render_buffer_texture_destroy(struct render_buffer_texture *buffer)
+{
+    if (buffer->texture)
+        glDeleteTextures(1, &buffer->texture);
+    if (buffer->buffer)
+        glDeleteBuffers(1, &buffer->buffer);
+    *buffer = (struct render_buffer_texture){ 0 };
+}
+
+void render_buffer_texture_fill(struct render_buffer_texture *buffer, GLenum format, const void *data,
+                                size_t size)
+{
+    render_buffer_texture_destroy(buffer);
+    glCreateBuffers(1, &buffer->buffer);
+    glNamedBufferStorage(buffer->buffer, (GLsizeiptr)size, data, 0);
+    glCreateTextures(GL_TEXTURE_BUFFER, 1, &buffer->texture);
+    glTextureBuffer(buffer->texture, format, buffer->buffer);
 }

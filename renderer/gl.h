@@ -39,6 +39,16 @@ DIPOLE_CHECKED bool render_program_create(const struct render_shader *vertex,
                                           const struct render_shader *fragment, const char *defines,
                                           GLuint *program_out, dipole_status *status);
 
+/* A buffer that shaders read as a texture. */
+struct render_buffer_texture {
+    GLuint buffer, texture;
+};
+
+/* Put new data in place of the old; size > 0. Destroy accepts { 0 }. */
+void render_buffer_texture_fill(struct render_buffer_texture *buffer, GLenum format, const void *data,
+                                size_t size);
+void render_buffer_texture_destroy(struct render_buffer_texture *buffer);
+
 /* Uniforms by name; a program that has none of that name is left alone. */
 void render_set_int(GLuint program, const char *name, int value);
 void render_set_float(GLuint program, const char *name, double value);

@@ -1,5 +1,6 @@
 #include "renderer/light_samples.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -15,15 +16,22 @@ struct block {
 };
 
 struct reducer {
-    struct render_light_samples *samples;
+    const struct render_light_target *targets;
     const struct render_light_view *view;
+    int object; /* that is being sampled */
     double limit_mm;
     dipole_status *status;
 };
 
-static const float *texel(const struct render_light_view *view, int x, int y)
+/* The texel, if it shows a lit surface of the object; else NULL. */
+static const float *lit_texel(const struct reducer *reducer, int x, int y)
 {
-    return view->texels + 4 * ((size_t)y * (size_t)view->size_px + (size_t)x);
+    const struct render_light_view *const view = reducer->view;
+    const size_t index = (size_t)y * (size_t)view->size_px + (size_t)x;
+    assert(view->texels);
+    const float *const texel = view->texels + 4 * index;
+    const bool is_its = !view->objects || view->objects[index] == (float)(reducer->object + 1);
+    return texel[3] > 0 && is_its ? texel : NULL;
 }
 
 /*
@@ -31,14 +39,15 @@ static const float *texel(const struct render_light_view *view, int x, int y)
  * to end, and in depth from nearest to farthest. Positions are those of texel centres, so the extent is
  * scaled from the distance of centres to whole texels.
  */
-static double line_extent_mm(const struct render_light_view *view, int x, int y, int dx, int dy, int count)
+static double line_extent_mm(const struct reducer *reducer, int x, int y, int dx, int dy, int count)
 {
+    const struct render_light_view *const view = reducer->view;
     const float *first = NULL, *last = NULL;
     int first_index = 0, last_index = 0;
     double depth_min = INFINITY, depth_max = -INFINITY;
     for (int i = 0; i < count; i++) {
-        const float *const t = texel(view, x + i * dx, y + i * dy);
-        if (!(t[3] > 0))
+        const float *const t = lit_texel(reducer, x + i * dx, y + i * dy);
+        if (!t)
             continue;
         const double depth = view->forward[0] * (double)t[0] + view->forward[1] * (double)t[1] +
                              view->forward[2] * (double)t[2];
@@ -51,7 +60,7 @@ static double line_extent_mm(const struct render_light_view *view, int x, int y,
         last = t;
         last_index = i;
     }
-    if (first_index == last_index)
+    if (!first || first_index == last_index)
         return 0;
     double step[3], along = 0;
     for (int k = 0; k < 3; k++) {
@@ -68,23 +77,25 @@ static double line_extent_mm(const struct render_light_view *view, int x, int y,
 
 /* Largest extent of a block's lines along x (or y). A block one texel wide is measured together with its
  * neighbour, of which it is half. */
-static double block_extent_mm(const struct render_light_view *view, struct block block, bool is_along_x)
+static double block_extent_mm(const struct reducer *reducer, struct block block, bool is_along_x)
 {
+    const int size_px = reducer->view->size_px;
     const int length = is_along_x ? block.width : block.height;
     if (length == 1) {
         if (is_along_x) {
             block.x &= ~1;
-            block.width = block.x + 2 <= view->size_px ? 2 : 1;
+            block.width = block.x + 2 <= size_px ? 2 : 1;
         } else {
             block.y &= ~1;
-            block.height = block.y + 2 <= view->size_px ? 2 : 1;
+            block.height = block.y + 2 <= size_px ? 2 : 1;
         }
     }
     double largest = 0;
     const int lines = is_along_x ? block.height : block.width;
     for (int i = 0; i < lines; i++) {
-        const double extent = is_along_x ? line_extent_mm(view, block.x, block.y + i, 1, 0, block.width)
-                                         : line_extent_mm(view, block.x + i, block.y, 0, 1, block.height);
+        const double extent = is_along_x
+                                  ? line_extent_mm(reducer, block.x, block.y + i, 1, 0, block.width)
+                                  : line_extent_mm(reducer, block.x + i, block.y, 0, 1, block.height);
         largest = fmax(largest, extent);
     }
     return length == 1 ? 0.5 * largest : largest;
@@ -111,32 +122,37 @@ static bool append(struct render_light_samples *samples, const struct render_lig
 static bool append_block(const struct reducer *reducer, struct block block, double extent_mm)
 {
     const struct render_light_view *const view = reducer->view;
-    double share = 0, moment[3] = { 0, 0, 0 };
+    double share = 0, irradiance = 0, moment[3] = { 0, 0, 0 };
+    int lit_count = 0;
     for (int y = block.y; y < block.y + block.height; y++) {
         for (int x = block.x; x < block.x + block.width; x++) {
-            const float *const t = texel(view, x, y);
-            if (!(t[3] > 0))
+            const float *const t = lit_texel(reducer, x, y);
+            if (!t)
                 continue;
             share += (double)t[3];
+            lit_count++;
+            if (view->irradiance)
+                irradiance += (double)view->irradiance[(size_t)y * (size_t)view->size_px + (size_t)x];
             for (int k = 0; k < 3; k++)
                 moment[k] += (double)t[3] * (double)t[k];
         }
     }
     if (!(share > 0))
         return true;
-    struct render_light_sample sample = { .footprint_mm = (float)extent_mm };
+    struct render_light_sample sample = { .footprint_mm = (float)extent_mm,
+                                          .object = (float)reducer->object };
     for (int k = 0; k < 3; k++) {
         sample.position_mm[k] = (float)(moment[k] / share);
-        sample.flux_w[k] = (float)(share * view->rgb[k]);
+        sample.flux_w[k] = (float)((view->irradiance ? irradiance / lit_count : share) * view->rgb[k]);
     }
-    return append(reducer->samples, &sample, reducer->status);
+    return append(reducer->targets[reducer->object].samples, &sample, reducer->status);
 }
 
 /* Halve the block across its longer side on the surface until both are short enough. */
 static bool reduce_block(const struct reducer *reducer, struct block block)
 {
-    const double extent_x_mm = block_extent_mm(reducer->view, block, true);
-    const double extent_y_mm = block_extent_mm(reducer->view, block, false);
+    const double extent_x_mm = block_extent_mm(reducer, block, true);
+    const double extent_y_mm = block_extent_mm(reducer, block, false);
     const bool can_split_x = block.width > 1 && extent_x_mm > reducer->limit_mm;
     const bool can_split_y = block.height > 1 && extent_y_mm > reducer->limit_mm;
     if (!can_split_x && !can_split_y)
@@ -154,29 +170,57 @@ static bool reduce_block(const struct reducer *reducer, struct block block)
     return reduce_block(reducer, low) && reduce_block(reducer, high);
 }
 
+/* The lowest object in the block that is not below the given one, lit; -1: none. */
+static int next_object(const struct render_light_view *view, struct block block, int least)
+{
+    float next = INFINITY;
+    for (int y = block.y; y < block.y + block.height; y++) {
+        for (int x = block.x; x < block.x + block.width; x++) {
+            const size_t index = (size_t)y * (size_t)view->size_px + (size_t)x;
+            if (view->texels[4 * index + 3] > 0 && view->objects[index] > (float)least)
+                next = fminf(next, view->objects[index]);
+        }
+    }
+    return isfinite(next) ? (int)next - 1 : -1;
+}
+
+/* The block's samples, object by object. */
+static bool reduce_objects(struct reducer *reducer, struct block block)
+{
+    const bool has_objects = reducer->view->objects != NULL;
+    int object = has_objects ? next_object(reducer->view, block, 0) : 0;
+    while (object >= 0) {
+        const struct render_light_target *const target = &reducer->targets[object];
+        reducer->object = object;
+        reducer->limit_mm = target->spacing_mm * (1 + EXTENT_SLACK);
+        if (target->samples && !reduce_block(reducer, block))
+            return false;
+        object = has_objects ? next_object(reducer->view, block, object + 1) : -1;
+    }
+    return true;
+}
+
 /* Walk down the quadtree over the whole view: samples near in space then lie near in the list. */
-static bool reduce_quadrant(const struct reducer *reducer, int x, int y, int size)
+static bool reduce_quadrant(struct reducer *reducer, int x, int y, int size)
 {
     const int size_px = reducer->view->size_px;
     if (x >= size_px || y >= size_px)
         return true;
     if (size <= 1 << reducer->view->levels)
-        return reduce_block(reducer, (struct block){ .x = x,
-                                                     .y = y,
-                                                     .width = size < size_px - x ? size : size_px - x,
-                                                     .height = size < size_px - y ? size : size_px - y });
+        return reduce_objects(reducer, (struct block){ .x = x,
+                                                       .y = y,
+                                                       .width = size < size_px - x ? size : size_px - x,
+                                                       .height = size < size_px - y ? size : size_px - y });
     const int half = size / 2;
     return reduce_quadrant(reducer, x, y, half) && reduce_quadrant(reducer, x + half, y, half) &&
            reduce_quadrant(reducer, x, y + half, half) &&
            reduce_quadrant(reducer, x + half, y + half, half);
 }
 
-bool render_light_samples_append(struct render_light_samples *samples, const struct render_light_view *view,
-                                 double spacing_mm, dipole_status *status)
+bool render_light_samples_append(const struct render_light_target *targets,
+                                 const struct render_light_view *view, dipole_status *status)
 {
-    const struct reducer reducer = {
-        .samples = samples, .view = view, .limit_mm = spacing_mm * (1 + EXTENT_SLACK), .status = status
-    };
+    struct reducer reducer = { .targets = targets, .view = view, .status = status };
     int size = 1;
     while (size < view->size_px)
         size *= 2;
@@ -185,10 +229,11 @@ bool render_light_samples_append(struct render_light_samples *samples, const str
 
 /* ---- merging ------------------------------------------------------------------------------------ */
 
-/* A sample's cube, as its place on the Z-order curve. */
+/* A sample's object, and its cube as its place on the Z-order curve. */
 struct key {
     uint64_t code;
     size_t index;
+    float object;
 };
 
 /* Put two zeros between the low 21 bits. */
@@ -212,10 +257,12 @@ static uint64_t cube_code(const struct render_light_sample *sample, const double
     return code;
 }
 
-/* By code, then by index: the same order everywhere. */
+/* By object, code, then index: the same order everywhere. */
 static int compare_keys(const void *a, const void *b)
 {
     const struct key *const x = a, *const y = b;
+    if (x->object != y->object)
+        return x->object < y->object ? -1 : 1;
     if (x->code != y->code)
         return x->code < y->code ? -1 : 1;
     return x->index < y->index ? -1 : x->index > y->index;
@@ -246,7 +293,7 @@ static struct render_light_sample merge_run(const struct render_light_samples *s
             max[k] = fmaxf(max[k], sample->position_mm[k]);
         }
     }
-    struct render_light_sample merged = { .reserved = 0 };
+    struct render_light_sample merged = { .object = keys[0].object };
     for (int k = 0; k < 3; k++) {
         merged.position_mm[k] = (float)(moment[k] / weight_sum);
         merged.flux_w[k] = (float)flux_w[k];
@@ -272,12 +319,14 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
             min_mm[k] = fmin(min_mm[k], (double)samples->samples[i].position_mm[k]);
     }
     for (size_t i = 0; i < count; i++)
-        keys[i] = (struct key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm), .index = i };
+        keys[i] = (struct key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm),
+                                .index = i,
+                                .object = samples->samples[i].object };
     qsort(keys, count, sizeof *keys, compare_keys);
     bool done = true;
     for (size_t first = 0, end; done && first < count; first = end) {
         end = first + 1;
-        while (end < count && keys[end].code == keys[first].code)
+        while (end < count && keys[end].code == keys[first].code && keys[end].object == keys[first].object)
             end++;
         const struct render_light_sample sample = merge_run(samples, keys + first, end - first);
         done = append(merged, &sample, status);

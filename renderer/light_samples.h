@@ -7,12 +7,12 @@
 
 #include "libdipole/dipole.h"
 
-/* Light that enters through one patch of surface. */
+/* Light that enters through one patch of surface. Two texels of a buffer. */
 struct render_light_sample {
     float position_mm[3]; /* flux-weighted mean of the patch          */
     float footprint_mm;   /* largest extent of the patch              */
     float flux_w[3];      /* transmitted power per channel, in W      */
-    float reserved;       /* keeps rows 16-byte aligned for the GPU   */
+    float object;         /* whose surface it is; 0 without object ids */
 };
 
 struct render_light_samples {
@@ -24,25 +24,36 @@ struct render_light_samples {
  * power share times the light's rgb is the transmitted power in W of the texel; 0 where no surface is. */
 struct render_light_view {
     const float *texels;
+    const float *objects; /* of each texel: object + 1; NULL: all are object 0 */
+    const float
+        *irradiance; /* of each texel, per rgb; NULL, or in place of its flux samples get their mean */
     int size_px;
     double forward[3]; /* unit vector, the view's depth axis */
     double rgb[3];
     int levels; /* texels are merged in blocks of 2^levels at most         */
 };
 
+/* Where the samples of an object go, and how far apart they may be. NULL: it gets none. */
+struct render_light_target {
+    struct render_light_samples *samples;
+    double spacing_mm;
+};
+
 /*
- * Append the samples of one view: each block of 2^levels texels a side is halved, across the side that is
+ * Append the samples of one view to the target of each object, of which there are as many as objects (or
+ * one): each block of 2^levels texels a side is halved, across the side that is
  * longer on the surface, until both extents on the surface (size across the view and depth range) are at
- * most spacing_mm, or one texel is left. Neighbours in the list are near each other in space.
- * Fails with DIPOLE_OUT_OF_MEMORY.
+ * most spacing_mm, or one texel is left. Objects in one block are sampled one after the other. Neighbours
+ * in the list are near each other in space. Fails with DIPOLE_OUT_OF_MEMORY.
  */
-DIPOLE_CHECKED bool render_light_samples_append(struct render_light_samples *samples,
-                                                const struct render_light_view *view, double spacing_mm,
+DIPOLE_CHECKED bool render_light_samples_append(const struct render_light_target *targets,
+                                                const struct render_light_view *view,
                                                 dipole_status *status);
 
 /*
- * Append to *merged one sample for each cube of side cell_mm that holds samples: total flux, flux-weighted
- * mean position. They are ordered along a space-filling curve. Fails with DIPOLE_OUT_OF_MEMORY.
+ * Append to *merged one sample for each object in each cube of side cell_mm that holds samples: total flux,
+ * flux-weighted mean position. They are ordered along a space-filling curve. Fails with
+ * DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_light_samples_merge(const struct render_light_samples *samples, double cell_mm,
                                                struct render_light_samples *merged, dipole_status *status);

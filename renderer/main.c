@@ -2,40 +2,78 @@
 #include "cli/cli.h"
 #include "renderer/output.h"
 #include "renderer/plan.h"
+#include "renderer/reference.h"
 #include "renderer/tables.h"
 #include "renderer/view.h"
+#include "renderer/volumes.h"
 
 #include <jansson.h>
+#include <limits.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct options {
     struct cli_common common;
     struct cli_texts allowed_paths;
-    const char *output_path, *table_folder;
+    const char *output_path, *table_folder, *camera_name;
     double epsilon;
-    int technique, context;
+    int technique, context, area;
+    int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int size_px[2];
+    int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
+};
+
+/* What all frames are drawn with. */
+struct job {
+    const struct cli_tool *tool;
+    const struct options *options;
+    struct io_scene *scene;
+    struct renderer *renderer; /* NULL: the reference, without OpenGL: works where there is none */
+    struct render_options drawing;
+    struct cli_progress progress;
+    int frame_count, drawn_count;
+    struct render_report report; /* of the last frame drawn */
 };
 
 /* In the order of enum render_context_kind, without the default. */
 static const char *const context_names[] = { "osmesa", "egl", "window", NULL };
 
+/* Index i: 2 i surfaces, which come in pairs. */
+static const char *const layer_count_names[] = { "0", "2", "4", "6", "8", "10", "12", "14", "16", NULL };
+
+/* Index 0: the usual number, or whatever the volumes of a folder have. */
+static const char *const sample_count_names[] = { "usual", "13", "21", "53", "117", "245", NULL };
+static const int sample_counts[] = { 0, 13, 21, 53, 117, 245 };
+
 /* ---- results ------------------------------------------------------------------------------------ */
 
-static bool print_json(const struct render_report *report, const char *path, dipole_status *status)
+/* null where nothing bounds the error. */
+static json_t *create_error(double error)
+{
+    return isfinite(error) ? json_real(error) : json_null();
+}
+
+/* NULL: no memory, or a path that is not UTF-8. */
+static json_t *create_result(const struct render_report *report, const char *path)
 {
     json_t *const effects = json_array();
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f}", "name", effect->name, "active",
-                                                 effect->is_active, "reason", effect->reason, "ms",
-                                                 effect->time_ms));
+        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f, s:f, s:o}", "name", effect->name,
+                                                 "active", effect->is_active, "reason", effect->reason,
+                                                 "predicted_ms", effect->predicted_ms, "ms",
+                                                 effect->time_ms, "error", create_error(effect->error)));
     }
-    json_t *const result = json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique",
-                                     render_technique_names[report->technique], "epsilon", report->epsilon,
-                                     "effects", effects, "total_ms", report->total_ms, "image", path);
+    return json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique", render_technique_names[report->technique],
+                     "epsilon", report->epsilon, "effects", effects, "total_ms", report->total_ms, "image",
+                     path);
+}
+
+/* Ends the result, which may be NULL. */
+static bool print_json(json_t *result, dipole_status *status)
+{
     char *const text = result ? io_json_format(result) : NULL;
     if (text)
         fputs(text, stdout);
@@ -51,52 +89,188 @@ static void print_plan(const struct render_report *report)
 {
     printf("technique %s, epsilon %g\n", render_technique_names[report->technique], report->epsilon);
     if (report->r_max_mm > 0) {
-        printf("error predicted %.3g = truncation %.3g + aliasing %.3g + banding %.3g + table %.3g\n",
+        printf("error predicted %.3g = truncation %.3g + aliasing %.3g + blur %.3g + banding %.3g + table "
+               "%.3g\n",
                report->error_predicted, report->truncation_error, report->aliasing_error,
-               report->banding_error, report->table_error);
+               report->blur_error, report->banding_error, report->table_error);
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);
     }
-    printf("%-14s  %-6s  %9s  reason\n%-14s  %-6s  %9s\n", "effect", "active", "time", "", "", "ms");
+    if (report->map_count > 0)
+        printf(
+            "error not bounded; of the table %.3g\n%d translucent shadow map%s, up to %d texels a side\n",
+            report->table_error, report->map_count, report->map_count == 1 ? "" : "s", report->map_side_px);
+    if (report->doubling_count > 0)
+        printf("%12s  estimated error\n", "samples");
+    for (size_t i = 0; i < report->doubling_count; i++)
+        printf("%12zu  %.3g\n", report->doublings[i].sample_count, report->doublings[i].error);
+    printf("%-16s  %-6s  %9s  %9s  %8s  reason\n%-16s  %-6s  %9s  %9s\n", "effect", "active", "predicted",
+           "time", "error", "", "", "ms", "ms");
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        printf("%-14s  %-6s  %9.1f  %s\n", effect->name, effect->is_active ? "yes" : "no", effect->time_ms,
-               effect->reason);
+        char error[16] = "unbound.";
+        if (isfinite(effect->error))
+            snprintf(error, sizeof error, "%.2g", effect->error);
+        printf("%-16s  %-6s  %9.1f  %9.1f  %8s  %s\n", effect->name, effect->is_active ? "yes" : "no",
+               effect->predicted_ms, effect->time_ms, error, effect->reason);
     }
 }
 
-static bool print_results(const struct cli_tool *tool, const struct options *options,
-                          const struct render_report *report, dipole_status *status)
+/* What is said of each picture; with --json nothing. */
+static void print_report(const struct options *options, const struct render_report *report,
+                         const char *path)
 {
-    for (size_t i = 0; i < report->note_count; i++)
-        cli_note(tool, &options->common, "%s", report->notes[i]);
-    if (options->common.json) {
-        if (!print_json(report, options->output_path, status))
-            return false;
-    } else {
-        if (options->is_explained)
-            print_plan(report);
-        printf("%s: %s, epsilon %g, %.0f ms\n", options->output_path,
-               render_technique_names[report->technique], report->epsilon, report->total_ms);
+    if (options->common.json)
+        return;
+    if (options->is_explained)
+        print_plan(report);
+    printf("%s: %s, epsilon %g, %.0f ms\n", path, render_technique_names[report->technique],
+           report->epsilon, report->total_ms);
+}
+
+/* Notes of a picture, but those that the one before it had already. */
+static void print_notes(const struct job *job, const struct render_report *before)
+{
+    for (size_t i = 0; i < job->report.note_count; i++) {
+        bool is_new = true;
+        for (size_t k = 0; k < before->note_count; k++)
+            is_new = is_new && strcmp(before->notes[k], job->report.notes[i]) != 0;
+        if (is_new)
+            cli_note(job->tool, &job->options->common, "%s", job->report.notes[i]);
     }
-    return cli_stdout_finish(status);
 }
 
 /* ---- work --------------------------------------------------------------------------------------- */
 
-static bool draw(const struct cli_tool *tool, const struct options *options, struct renderer *renderer,
-                 struct io_scene *scene, const struct lut_splat *table, dipole_status *status)
+static void show_progress(void *context, const char *what, double fraction)
 {
-    const struct render_options drawing = { .technique = (enum render_technique)options->technique,
-                                            .epsilon = options->epsilon,
-                                            .table = table };
-    if (options->is_viewed) {
-        const struct render_view_options view = { .drawing = drawing, .save_path = options->output_path };
-        return render_view(renderer, scene, &view, status);
+    struct job *const job = context;
+    char text[64];
+    snprintf(text, sizeof text, "frame %d of %d", job->drawn_count + 1, job->frame_count);
+    cli_progress_show(&job->progress, job->frame_count > 1 ? text : what,
+                      (job->drawn_count + fraction) / job->frame_count);
+}
+
+static bool draw_reference(struct job *job, const char *path, dipole_status *status)
+{
+    struct io_image *image = NULL;
+    const bool done = render_output_check(path, &job->drawing.is_tone_mapped, status) &&
+                      render_reference_draw(job->scene, &job->drawing, &image, &job->report, status) &&
+                      render_output_save(path, image, status);
+    io_image_destroy(image);
+    return done;
+}
+
+/* Draw the scene as it stands, write the picture and tell of it. */
+static bool draw_picture(struct job *job, const char *path, dipole_status *status)
+{
+    const struct render_report before = job->report;
+    if (job->frame_count > 1)
+        show_progress(job, NULL, 0);
+    if (job->renderer ? !render_output_write(job->renderer, &job->drawing, path, &job->report, status)
+                      : !draw_reference(job, path, status))
+        return false;
+    if (job->frame_count > 1)
+        cli_progress_show(&job->progress, "", 1); /* other lines follow */
+    print_notes(job, &before);
+    print_report(job->options, &job->report, path);
+    job->drawn_count++;
+    return true;
+}
+
+/* "a/name.png" becomes "a/name.0012.png". The path ends in a suffix: that was checked. */
+static void number_path(const char *path, int frame, char *out, size_t size)
+{
+    const char *const suffix = strrchr(path, '.');
+    snprintf(out, size, "%.*s.%04d%s", (int)(suffix - path), path, frame, suffix);
+}
+
+static bool draw_frames(struct job *job, dipole_status *status)
+{
+    const int first = job->options->frames[0];
+    json_t *const results = json_array();
+    double total_ms = 0;
+    bool is_done = true;
+    for (int frame = first; frame < first + job->frame_count && is_done; frame++) {
+        char path[PATH_MAX + 16];
+        number_path(job->options->output_path, frame, path, sizeof path);
+        io_scene_set_frame(job->scene, frame);
+        is_done = draw_picture(job, path, status);
+        total_ms += job->report.total_ms;
+        if (job->options->common.json && is_done)
+            json_array_append_new(results, create_result(&job->report, path));
     }
-    struct render_report report;
-    return render_output_write(renderer, &drawing, options->output_path, &report, status) &&
-           print_results(tool, options, &report, status);
+    if (!is_done || !job->options->common.json) {
+        json_decref(results);
+        return is_done;
+    }
+    const bool is_whole = json_array_size(results) == (size_t)job->frame_count;
+    json_t *const result = json_pack("{s:o, s:f}", "frames", results, "total_ms", total_ms);
+    if (is_whole)
+        return print_json(result, status);
+    json_decref(result);
+    return print_json(NULL, status);
+}
+
+/* The pictures that were asked for: one, or numbered frames. */
+static bool draw(struct job *job, dipole_status *status)
+{
+    const struct options *const options = job->options;
+    if (options->is_viewed) {
+        const struct render_view_options view = { .drawing = job->drawing,
+                                                  .save_path = options->output_path };
+        return render_view(job->renderer, job->scene, &view, status);
+    }
+    cli_progress_start(&job->progress, job->tool, &options->common);
+    job->drawing.progress = (struct render_progress){ .show = show_progress, .context = job };
+    if (options->frames[0] >= 0)
+        return draw_frames(job, status) && cli_stdout_finish(status);
+    return draw_picture(job, options->output_path, status) &&
+           (!options->common.json ||
+            print_json(create_result(&job->report, options->output_path), status)) &&
+           cli_stdout_finish(status);
+}
+
+/* What the technique asks of the folder that was named, if one was. */
+static bool find_tables(const struct job *job, struct render_tables **tables_out,
+                        struct render_volumes **volumes_out, dipole_status *status)
+{
+    const char *const folder = job->options->table_folder;
+    struct render_media *media = NULL;
+    bool is_done = !folder || render_media_create(job->scene, &media, status);
+    if (folder && is_done)
+        is_done = job->options->technique == RENDER_TECHNIQUE_TSM
+                      ? render_volumes_find(folder, media, sample_counts[job->options->tsm_samples],
+                                            volumes_out, status)
+                      : render_tables_find(folder, media, tables_out, status);
+    render_media_destroy(media);
+    return is_done;
+}
+
+static bool draw_by_opengl(struct job *job, dipole_status *status)
+{
+    const struct options *const options = job->options;
+    const enum render_context_kind kind =
+        options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
+    struct render_tables *tables = NULL;
+    struct render_volumes *volumes = NULL;
+    bool is_done = find_tables(job, &tables, &volumes, status);
+    job->drawing.tables = tables ? tables->of_medium : NULL;
+    job->drawing.volumes = volumes ? (const struct lut_tsm *const *)volumes->volumes : NULL;
+    is_done = is_done && render_create(job->scene, kind, &job->renderer, status) && draw(job, status);
+    render_destroy(job->renderer);
+    render_tables_destroy(tables);
+    render_volumes_destroy(volumes);
+    return is_done;
+}
+
+static bool check_frames(const struct options *options, const struct io_scene *scene, dipole_status *status)
+{
+    const dipole_place place = { .source = scene->path };
+    const int count = scene->frames.count;
+    return options->frames[1] < count ||
+           dipole_fail(status, DIPOLE_BAD_VALUE, &place, "frames %d to %d are asked for, expected 0 to %d",
+                       options->frames[0], options->frames[1], count - 1);
 }
 
 static bool run(const struct cli_tool *tool, const struct options *options, const char *scene_path,
@@ -104,30 +278,32 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
 {
     const struct io_scene_options reading = { .allowed_paths = options->allowed_paths.values,
                                               .allowed_path_count = options->allowed_paths.count,
+                                              .camera_name = options->camera_name,
                                               .width_px = options->size_px[0],
                                               .height_px = options->size_px[1] };
-    const enum render_context_kind kind =
-        options->is_viewed ? RENDER_CONTEXT_WINDOW : (enum render_context_kind)(options->context + 1);
-    struct io_scene *scene = NULL;
-    struct lut_splat *table = NULL;
-    struct renderer *renderer = NULL;
-    bool is_png;
-    const bool done =
-        (!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
-        io_scene_read(scene_path, &reading, &scene, status) && render_plan_check_media(scene, status) &&
-        (!options->table_folder ||
-         render_table_find(options->table_folder, &scene->objects[0].material, &table, status)) &&
-        render_create(scene, kind, &renderer, status) &&
-        draw(tool, options, renderer, scene, table, status);
-    render_destroy(renderer);
-    lut_splat_destroy(table);
-    io_scene_destroy(scene);
+    struct job job = { .tool = tool,
+                       .options = options,
+                       .drawing = { .technique = (enum render_technique)options->technique,
+                                    .area = (enum render_area)options->area,
+                                    .epsilon = options->epsilon,
+                                    .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
+                                             .response = (enum render_tsm_response)options->tsm_response,
+                                             .part = (enum render_tsm_part)options->tsm_part,
+                                             .sample_count = sample_counts[options->tsm_samples],
+                                             .layer_count = 2 * options->layer_pairs } },
+                       .frame_count = options->frames[1] - options->frames[0] + 1 };
+    bool is_png = false, done = false;
+    if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
+        io_scene_read(scene_path, &reading, &job.scene, status) && check_frames(options, job.scene, status))
+        done = options->technique == RENDER_TECHNIQUE_REFERENCE ? draw(&job, status)
+                                                                : draw_by_opengl(&job, status);
+    io_scene_destroy(job.scene);
     return done;
 }
 
 int main(int argc, char **argv)
 {
-    struct options options = { .epsilon = RENDER_EPSILON_DEFAULT, .context = -1 };
+    struct options options = { .epsilon = RENDER_EPSILON_DEFAULT, .context = -1, .frames = { -1, -1 } };
     const struct cli_option table[] = {
         { .name = "output",
           .letter = 'o',
@@ -148,8 +324,57 @@ int main(int argc, char **argv)
           .target = &options.technique,
           .argument = "NAME",
           .help = "splat: subsurface scattering; lambert: light leaves where it enters; auto: splat, or "
-                  "lambert where scattering stays within a pixel. Default auto.",
+                  "lambert where scattering stays within a pixel; tsm: translucent shadow maps, fast and "
+                  "rough; reference: the integral over the surface "
+                  "on the "
+                  "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
+        { .name = "splat-area",
+          .kind = CLI_CHOICE,
+          .target = &options.area,
+          .argument = "NAME",
+          .help =
+              "Area that a light sample stands for: flux, which needs none, or overlap, counted as in the "
+              "paper, for comparison. Default flux.",
+          .choices = render_area_names },
+        { .name = "tsm",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_gather,
+          .argument = "WHERE",
+          .help =
+              "Gather the global response of translucent shadow maps at each fragment, the default, or at "
+              "each vertex.",
+          .choices = render_tsm_gather_names },
+        { .name = "tsm-response",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_response,
+          .argument = "KIND",
+          .help =
+              "table: samples looked up in a volume, the default; exact: without a table; texels: the sum "
+              "over all texels, slow; profile: the same of the profile at the distance, as splats sum it.",
+          .choices = render_tsm_response_names },
+        { .name = "tsm-part",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_part,
+          .argument = "PART",
+          .help = "sum, the default, or the global or the local response alone.",
+          .choices = render_tsm_part_names },
+        { .name = "tsm-samples",
+          .kind = CLI_CHOICE,
+          .target = &options.tsm_samples,
+          .argument = "N",
+          .help = "Samples of a translucent shadow map for each point: 13, 21, 53, 117 or 245; usual, the "
+                  "default, "
+                  "is 21 as in the paper, or what the volumes in the folder of --luts have.",
+          .choices = sample_count_names },
+        { .name = "peel",
+          .kind = CLI_CHOICE,
+          .target = &options.layer_pairs,
+          .argument = "N",
+          .help =
+              "Tell material from air by N surfaces behind each other in translucent shadow maps, an even "
+              "number up to 16; default 0: all is taken for solid.",
+          .choices = layer_count_names },
         { .name = "epsilon",
           .letter = 'e',
           .kind = CLI_NUMBER,
@@ -169,6 +394,19 @@ int main(int argc, char **argv)
           .help = "Size of the picture in pixels, sides 1 to 16384; default the scene's.",
           .min = 1,
           .max = RENDER_SIDE_LIMIT },
+        { .name = "camera",
+          .kind = CLI_TEXT,
+          .target = &options.camera_name,
+          .argument = "NAME",
+          .help = "Which of the scene's cameras; default the first." },
+        { .name = "frames",
+          .kind = CLI_RANGE,
+          .target = options.frames,
+          .argument = "A:B",
+          .help = "Draw frames A to B, or A alone, of a scene in motion, counted from 0, into numbered "
+                  "pictures: name.png becomes name.0000.png and so on. Default: frame 0, not numbered.",
+          .min = 0,
+          .max = 99999 },
         { .name = "context",
           .kind = CLI_CHOICE,
           .target = &options.context,
@@ -214,6 +452,15 @@ int main(int argc, char **argv)
     }
     if (!options.output_path && !options.is_viewed) {
         dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "no --output (-o) IMG was given; try --help");
+        return cli_report(&tool, &status, EXIT_USAGE);
+    }
+    if (options.is_viewed && options.frames[0] >= 0) {
+        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "--view cannot be used with --frames");
+        return cli_report(&tool, &status, EXIT_USAGE);
+    }
+    if (options.technique == RENDER_TECHNIQUE_REFERENCE && (options.is_viewed || options.table_folder)) {
+        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "--technique reference cannot be used with %s",
+                    options.is_viewed ? "--view" : "--luts");
         return cli_report(&tool, &status, EXIT_USAGE);
     }
     if (!run(&tool, &options, operands[0], &status))

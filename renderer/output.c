@@ -21,6 +21,12 @@ bool render_output_check(const char *path, bool *is_png_out, dipole_status *stat
     return io_file_check_writable(path, status);
 }
 
+bool render_output_save(const char *path, const struct io_image *image, dipole_status *status)
+{
+    return ends_with(path, ".png") ? io_png_write(path, image, status)
+                                   : io_exr_write(path, image, false, status);
+}
+
 bool render_output_write(struct renderer *renderer, const struct render_options *options, const char *path,
                          struct render_report *report_out, dipole_status *status)
 {
@@ -28,8 +34,7 @@ bool render_output_write(struct renderer *renderer, const struct render_options 
     struct io_image *image = NULL;
     const bool done = render_output_check(path, &for_file.is_tone_mapped, status) &&
                       render_draw(renderer, &for_file, &image, report_out, status) &&
-                      (for_file.is_tone_mapped ? io_png_write(path, image, status)
-                                               : io_exr_write(path, image, false, status));
+                      render_output_save(path, image, status);
     io_image_destroy(image);
     return done;
 }

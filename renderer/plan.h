@@ -14,10 +14,14 @@ struct render_frame; /* execute.h */
 /* What is asked. */
 struct render_request {
     const struct io_scene *scene;
-    const struct lut_splat *table; /* NULL: one is baked to the plan's table_epsilon */
+    const struct render_media *media;     /* of the scene; NULL: made for this plan                  */
+    const struct render_table *tables;    /* one for each medium; NULL: baked to the plan's table_epsilon */
+    const struct lut_tsm *const *volumes; /* the same of translucent shadow maps            */
+    struct render_tsm_options tsm;
     double epsilon;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
+    enum render_area area;
     bool is_captured; /* no scattering; what it would need is kept instead */
     bool is_tone_mapped;
 };
@@ -25,30 +29,35 @@ struct render_request {
 enum render_draw_kind {
     RENDER_DRAW_SCENE = 0,  /* every object                                    */
     RENDER_DRAW_FULLSCREEN, /* one triangle over the target                    */
-    RENDER_DRAW_SPLATS,     /* one rectangle per splat                         */
-    RENDER_DRAW_NOTHING,    /* the pass's run function works on the CPU        */
+    RENDER_DRAW_BY_RUN,     /* the pass's run function draws into the targets  */
+    RENDER_DRAW_NOTHING,    /* the pass's run function needs no targets        */
 };
 
-enum { RENDER_PASS_READS = 6, RENDER_PASS_WRITES = 3 };
+enum { RENDER_PASS_READS = 8, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 2, RENDER_PASS_TARGETS = 6 };
 
 /* One row of an effect. Names of textures are those of the table in plan.c. */
 struct render_pass {
     const char *name; /* also of its shaders: NAME.vert or fullscreen.vert, NAME.frag */
     enum render_draw_kind draw;
     bool is_per_view; /* once for each of the lights' views        */
+    bool is_per_map;  /* once for each translucent shadow map      */
     bool is_added;    /* to what the target holds, else replaces it */
+    bool is_blended;  /* draws add up, on a target that was cleared         */
     const char *reads[RENDER_PASS_READS];
     const char *reads_if_written[RENDER_PASS_READS]; /* shader sees HAS_<NAME>        */
     const char *writes[RENDER_PASS_WRITES];
-    const char *depth_written;                      /* depth texture, tested and written         */
-    const char *depth_tested;                       /* depth texture, tested only                */
-    void (*bind)(const struct render_frame *frame); /* sets uniforms  */
-    bool (*run)(const struct render_frame *frame, dipole_status *status); /* draw NOTHING   */
+    const char *writes_if_wanted[RENDER_PASS_EXTRAS]; /* behind them, if render_plan_wants: HAS_<NAME> */
+    const char *depth_written;                        /* depth texture, tested and written         */
+    const char *depth_tested;                         /* depth texture, tested only                */
+    void (*bind)(const struct render_frame *frame);   /* sets uniforms  */
+    bool (*run)(const struct render_frame *frame, dipole_status *status); /* BY_RUN and NOTHING */
 };
 
 struct render_decision {
     bool is_active;
     char reason[160];
+    double cost_ms; /* predicted, 0 unless active         */
+    double error;   /* that it leaves, relative radiosity */
 };
 
 struct render_plan;
@@ -56,6 +65,8 @@ struct render_plan;
 struct render_effect {
     const char *name, *source; /* source: publication, or what it is */
     struct render_decision (*decide)(const struct render_request *request, const struct render_plan *plan);
+    double (*cost_ms)(const struct render_plan *plan); /* when it is active (cost.h)  */
+    double (*error)(const struct render_plan *plan);   /* NULL: it leaves none        */
     const struct render_pass *passes;
     size_t pass_count;
 };
@@ -67,14 +78,20 @@ extern const struct render_effect *const render_effects[];
 struct render_decision render_called_for(const char *format, ...) DIPOLE_PRINTF(1, 2);
 struct render_decision render_not_called_for(const char *format, ...) DIPOLE_PRINTF(1, 2);
 
-enum render_format { RENDER_RGBA32F = 0, RENDER_DEPTH32F, RENDER_ON_CPU };
-enum render_size { RENDER_SIZE_FRAME = 0, RENDER_SIZE_LIGHT_VIEW };
+/* OTHER: kept by its pass, which says how to bind it. */
+enum render_format { RENDER_RGBA32F = 0, RENDER_R32F, RENDER_DEPTH32F, RENDER_OTHER };
+enum render_size { RENDER_SIZE_FRAME = 0, RENDER_SIZE_LIGHT_VIEW, RENDER_SIZE_MAP, RENDER_SIZE_VERTICES };
+
+/* Width of textures with a texel for each vertex of the scene. */
+enum { RENDER_VERTEX_ROW = 1024 };
 
 struct render_texture {
     const char *name;
     enum render_format format;
     enum render_size size;
     bool is_multisampled;
+    bool is_mipmapped;       /* levels are made anew after each pass that writes it */
+    bool is_far_where_empty; /* of a light's view: cleared to a point far away, else to 0 */
 };
 
 /* The texture of that name; NULL when there is none. */
@@ -89,32 +106,63 @@ struct render_plan_view {
     int size_px;
     int levels;        /* blocks of 2^levels texels are at most spacing wide */
     double texel_area; /* mm^2; perspective: at distance 1                  */
+    size_t object;     /* of translucent shadow maps: whose light it holds  */
 };
 
 struct render_plan_pass {
     const struct render_pass *pass;
     size_t effect; /* index into render_effects                        */
-    size_t view;   /* index into views, when the pass is_per_view      */
+    size_t view;   /* index into views, when the pass is_per_view; into maps, when is_per_map */
+};
+
+/* What becomes of one object. */
+struct render_plan_object {
+    size_t medium;
+    struct render_ball ball;
+    bool is_visible;     /* some of it may be in the picture; what is not is no more than a blocker   */
+    double lit_area_mm2; /* of its surface that may face a light, light by light                     */
+    double pixel_count;  /* that it may cover, as a ball would                                       */
+    double spacing_mm;   /* of its finest light samples                                              */
+};
+
+/* What becomes of the visible objects of one medium. All 0 where there are none. */
+struct render_plan_medium {
+    bool is_visible;
+    double diameter_mm;               /* of the largest object                            */
+    double r_max_mm;                  /* splats reach as far                              */
+    double wanted_mm;                 /* spacing of light samples that epsilon asks for   */
+    double spacing_mm;                /* of the finest: as wanted, or as many as may be   */
+    double blur_mm[IO_CHANNEL_COUNT]; /* of the profile, so that they do not show; 0: none is needed */
+    struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
+    int band_count;
+    double inner_mm; /* of the pattern of samples of translucent shadow maps     */
+    double truncation_error, aliasing_error, blur_error, table_error;
 };
 
 /* Owns its lists; end it with render_plan_destroy. */
 struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
+    enum render_area area;
     double epsilon;
-    dipole_coefficients coefficients[IO_CHANNEL_COUNT];
-    double eta, diffuse_reflectance[IO_CHANNEL_COUNT];
-    bool has_scattering; /* some channel's alpha' > 0                        */
+    const struct render_media *media;
+    struct render_media *own_media; /* when the request brought none                    */
+    struct render_plan_object *objects;
+    struct render_plan_medium *of_medium;
+    bool has_scattering; /* some visible medium's        */
     bool has_specular;
-    size_t lit_count; /* lights that are not black                        */
+    bool has_object_ids;    /* objects are told apart: they differ, or are near each other */
+    const char *ids_reason; /* why, or why not                                             */
+    size_t lit_count;       /* lights that are not black                        */
+    size_t triangle_count;
+    double covered_px; /* pixels that objects may cover, at most all       */
 
-    /* The error budget: shares of epsilon, then what they lead to. */
+    /* The error budget: shares of epsilon, then what they lead to, of the worst medium. */
     double truncation_epsilon, aliasing_epsilon, banding_epsilon, table_epsilon;
-    double truncation_error, aliasing_error, banding_error, table_error, error_predicted;
-    double r_max_mm;                             /* splats reach as far                              */
-    double r_max_px;                             /* on the picture, at the nearest                   */
-    double spacing_mm;                           /* asked of the finest light samples */
-    struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
-    int band_count;
+    double truncation_error, aliasing_error, blur_error, banding_error, table_error, error_predicted;
+    double r_max_mm;   /* the farthest medium's                            */
+    double r_max_px;   /* on the picture, at the nearest                   */
+    double spacing_mm; /* the narrowest medium's                           */
+    int band_count;    /* the most of any medium                           */
     char notes[RENDER_NOTE_LIMIT][256];
     size_t note_count;
 
@@ -127,24 +175,32 @@ struct render_plan {
     size_t effect_count;
     struct render_plan_view *views;
     size_t view_count;
+    struct render_plan_view *maps; /* translucent shadow maps: of each light and visible object */
+    size_t map_count;
+    struct render_tsm_options tsm;
+    size_t vertex_count; /* of the scene, when the maps are gathered at vertices */
     struct render_plan_pass *passes;
     size_t pass_count;
 };
 
 /*
- * Fails with DIPOLE_BAD_VALUE (objects of different media, picture too large, epsilon out of range, table
- * of another medium), DIPOLE_OUT_OF_MEMORY, or when a pass would read what none has written.
+ * Fails with DIPOLE_BAD_VALUE (picture too large, epsilon out of range, table of another medium),
+ * DIPOLE_OUT_OF_MEMORY, or when a pass would read what none has written.
  */
 DIPOLE_CHECKED bool render_plan_create(const struct render_request *request, struct render_plan **plan_out,
                                        dipole_status *status);
 void render_plan_destroy(struct render_plan *plan);
 
-/* Fails unless every object has the same medium with one index; names the two objects. */
-DIPOLE_CHECKED bool render_plan_check_media(const struct io_scene *scene, dipole_status *status);
+/* Fails for an epsilon out of range, a picture that is too large, or too many lights. */
+DIPOLE_CHECKED bool render_plan_check_request(const struct io_scene *scene, double epsilon,
+                                              dipole_status *status);
+
+/* Whether a light is not black. */
+bool render_light_shines(const struct io_light *light);
 
 /* Fails unless the table is of this medium, by its hash; names the first coefficient that differs. place:
  * the table's file, or NULL. */
-DIPOLE_CHECKED bool render_plan_check_table(const struct lut_splat *table,
+DIPOLE_CHECKED bool render_plan_check_table(const struct render_table *table,
                                             const struct io_material *material, const dipole_place *place,
                                             dipole_status *status);
 
@@ -156,6 +212,19 @@ DIPOLE_CHECKED bool render_plan_check_table(const struct lut_splat *table,
 DIPOLE_CHECKED bool render_plan_add_passes(struct render_plan *plan,
                                            const struct render_effect *const *effects,
                                            dipole_status *status);
+
+/* The textures that a pass writes under this plan, ending with NULL; depth aside. */
+void render_plan_list_writes(const struct render_plan *plan, const struct render_pass *pass,
+                             const char *writes[RENDER_PASS_TARGETS + 1]);
+
+/* Whether the scene calls for a texture that a pass can write beside its others. */
+bool render_plan_wants(const struct render_plan *plan, const char *texture);
+
+/* Slices of a volume for so many samples, 0: the usual number; 0 when there is no such pattern. */
+int render_plan_slice_count(int sample_count);
+
+/* The texels of the largest map; 0 when there is none. */
+int render_plan_map_side_px(const struct render_plan *plan);
 
 /* Whether a pass of the plan writes, or needs, that texture. */
 bool render_plan_writes(const struct render_plan *plan, const char *texture);

@@ -1,10 +1,15 @@
 #include "renderer/projection.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 /* The nearest the near plane comes to an eye inside the scene, as part of the ball's radius. */
 #define NEAR_SHARE 1e-3
+
+/* Of a ball at the origin; and of an orthographic view's depth, as part of how far away it is. */
+#define LEAST_RADIUS_MM 1e-12
+#define LEAST_DEPTH 1e-12
 
 static void cross(const double a[3], const double b[3], double out[3])
 {
@@ -20,24 +25,46 @@ static void normalise(double v[3])
         v[k] /= length;
 }
 
+/* Positions are floats: a ball is no smaller than they can tell apart, so that what has shrunk to a point
+ * still has a view. */
+static double least_radius_mm(const double centre_mm[3])
+{
+    const double centre = fmax(fmax(fabs(centre_mm[0]), fabs(centre_mm[1])), fabs(centre_mm[2]));
+    return fmax(FLT_EPSILON * centre, LEAST_RADIUS_MM);
+}
+
+static double farthest2(const struct io_mesh *mesh, const double centre_mm[3])
+{
+    double radius2 = 0;
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+        double distance2 = 0;
+        for (int k = 0; k < 3; k++) {
+            const double d = (double)mesh->positions[3 * v + (size_t)k] - centre_mm[k];
+            distance2 += d * d;
+        }
+        radius2 = fmax(radius2, distance2);
+    }
+    return radius2;
+}
+
 struct render_ball render_ball_of_scene(const struct io_scene *scene)
 {
     struct render_ball ball = { .radius_mm = 0 };
     for (int k = 0; k < 3; k++)
         ball.centre_mm[k] = 0.5 * (scene->min_mm[k] + scene->max_mm[k]);
     double radius2 = 0;
-    for (size_t i = 0; i < scene->object_count; i++) {
-        const struct io_mesh *const mesh = scene->objects[i].mesh;
-        for (size_t v = 0; v < mesh->vertex_count; v++) {
-            double distance2 = 0;
-            for (int k = 0; k < 3; k++) {
-                const double d = (double)mesh->positions[3 * v + (size_t)k] - ball.centre_mm[k];
-                distance2 += d * d;
-            }
-            radius2 = fmax(radius2, distance2);
-        }
-    }
-    ball.radius_mm = sqrt(radius2);
+    for (size_t i = 0; i < scene->object_count; i++)
+        radius2 = fmax(radius2, farthest2(scene->objects[i].mesh, ball.centre_mm));
+    ball.radius_mm = fmax(sqrt(radius2), least_radius_mm(ball.centre_mm));
+    return ball;
+}
+
+struct render_ball render_ball_of_mesh(const struct io_mesh *mesh)
+{
+    struct render_ball ball = { .radius_mm = 0 };
+    for (int k = 0; k < 3; k++)
+        ball.centre_mm[k] = 0.5 * ((double)mesh->min[k] + (double)mesh->max[k]);
+    ball.radius_mm = fmax(sqrt(farthest2(mesh, ball.centre_mm)), least_radius_mm(ball.centre_mm));
     return ball;
 }
 
@@ -75,6 +102,8 @@ void render_projection_of_camera(const struct io_camera *camera, const struct re
     if (!out->is_orthographic) {
         out->near_mm = fmax(out->near_mm, NEAR_SHARE * ball->radius_mm);
         out->far_mm = fmax(out->far_mm, 2 * out->near_mm);
+    } else {
+        out->far_mm = fmax(out->far_mm, out->near_mm + LEAST_DEPTH * fabs(out->near_mm));
     }
 }
 

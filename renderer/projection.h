@@ -17,8 +17,10 @@ struct render_ball {
     double centre_mm[3], radius_mm;
 };
 
-/* The smallest ball about the middle of the scene's box that holds every vertex. */
+/* The smallest ball about the middle of the box, the scene's or the mesh's, that holds every vertex. It has
+ * a radius above 0 even where all vertices are the same. */
 struct render_ball render_ball_of_scene(const struct io_scene *scene);
+struct render_ball render_ball_of_mesh(const struct io_mesh *mesh);
 
 /* Turn the view along forward (a unit vector), with up as close as may be to the vector given. */
 void render_projection_aim(struct render_projection *projection, const double forward[3],

@@ -2,7 +2,9 @@
 
 #include "renderer/context.h"
 #include "renderer/execute.h"
+#include "renderer/reference.h"
 #include "renderer/renderer.h"
+#include "renderer/splat_draw.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,13 +23,12 @@ bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                    struct renderer **renderer_out, dipole_status *status)
 {
     *renderer_out = NULL;
-    if (!render_plan_check_media(scene, status))
-        return false;
     struct renderer *const renderer = calloc(1, sizeof *renderer);
     if (!renderer)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a renderer");
     renderer->scene = scene;
-    const bool done = render_context_create(kind, &renderer->context, status) &&
+    const bool done = render_media_create(scene, &renderer->media, status) &&
+                      render_context_create(kind, &renderer->context, status) &&
                       renderer->context->make_current(renderer->context, status) &&
                       render_gl_start(renderer->context->load, &renderer->errors, status) &&
                       render_executor_create(scene, &renderer->errors, &renderer->executor, status);
@@ -45,7 +46,9 @@ void render_destroy(struct renderer *renderer)
     if (renderer->executor && render_make_current(renderer, NULL))
         render_executor_destroy(renderer->executor);
     render_context_destroy(renderer->context);
-    lut_splat_destroy(renderer->table);
+    render_tables_destroy(renderer->tables);
+    render_volumes_destroy(renderer->volumes);
+    render_media_destroy(renderer->media);
     free(renderer);
 }
 
@@ -56,36 +59,56 @@ bool render_make_current(struct renderer *renderer, dipole_status *status)
            render_gl_start(renderer->context->load, &renderer->errors, status);
 }
 
-/* The table that the plan splats with: the caller's, or one baked now and kept for later calls. */
-static bool table_for(struct renderer *renderer, const struct render_request *request,
-                      const struct render_plan *plan, const struct lut_splat **table_out,
-                      dipole_status *status)
+/* The tables that the plan splats with: the caller's, or some baked now and kept for later calls. */
+static bool tables_for(struct renderer *renderer, const struct render_request *request,
+                       const struct render_plan *plan, const struct render_table **tables_out,
+                       dipole_status *status)
 {
-    *table_out = request->table;
-    if (request->table || !render_plan_reads(plan, "light_samples"))
+    *tables_out = request->tables;
+    if (request->tables || !render_plan_reads(plan, "light_samples"))
         return true;
-    if (!renderer->table || renderer->table->epsilon > plan->table_epsilon) {
-        lut_splat_destroy(renderer->table);
-        renderer->table = NULL;
-        const struct lut_request wanted = { .materials = &renderer->scene->objects[0].material,
-                                            .material_count = 1,
-                                            .epsilon = plan->table_epsilon };
-        if (!lut_splat_bake(&wanted, &renderer->table, status))
+    if (!renderer->tables || renderer->tables->epsilon > plan->table_epsilon) {
+        render_tables_destroy(renderer->tables);
+        renderer->tables = NULL;
+        if (!render_tables_bake(renderer->media, plan->table_epsilon, &renderer->tables, status))
             return false;
     }
-    *table_out = renderer->table;
+    *tables_out = renderer->tables->of_medium;
     return true;
 }
 
-bool render_run(struct renderer *renderer, const struct render_request *request,
+/* Volumes for the request, if it has none and may need some: baked now and kept for later calls. */
+static bool add_volumes(struct renderer *renderer, struct render_request *request, dipole_status *status)
+{
+    if (request->technique != RENDER_TECHNIQUE_TSM || request->volumes || request->is_captured)
+        return true;
+    const double epsilon = render_volume_epsilon(request->epsilon);
+    const int slice_count = render_plan_slice_count(request->tsm.sample_count);
+    if (slice_count == 0) /* the plan tells */
+        return true;
+    if (!renderer->volumes || renderer->volumes->epsilon > epsilon ||
+        renderer->volumes->slice_count != slice_count) {
+        render_volumes_destroy(renderer->volumes);
+        renderer->volumes = NULL;
+        if (!render_volumes_bake(renderer->media, epsilon, slice_count, &renderer->volumes, status))
+            return false;
+    }
+    request->volumes = (const struct lut_tsm *const *)renderer->volumes->volumes;
+    return true;
+}
+
+bool render_run(struct renderer *renderer, const struct render_request *request_in,
                 struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
 {
-    const struct lut_splat *table;
+    const struct render_table *tables;
+    struct render_request request = *request_in;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
-    const bool done = render_plan_create(request, &plan, status) && render_make_current(renderer, status) &&
-                      table_for(renderer, request, plan, &table, status) &&
-                      render_executor_run(renderer->executor, request, plan, table, time_ms, status);
+    const bool done =
+        render_plan_check_request(request.scene, request.epsilon, status) &&
+        add_volumes(renderer, &request, status) && render_plan_create(&request, &plan, status) &&
+        render_make_current(renderer, status) && tables_for(renderer, &request, plan, &tables, status) &&
+        render_executor_run(renderer->executor, &request, plan, tables, request.volumes, time_ms, status);
     if (done)
         *plan_out = plan;
     else
@@ -97,44 +120,62 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
                         const double time_ms[RENDER_EFFECT_LIMIT], struct render_report *report)
 {
     const bool is_splatted = render_plan_reads(plan, "light_samples");
+    const struct render_splatter *const splatter = render_executor_splatter(renderer->executor);
     *report = (struct render_report){
         .technique = plan->technique,
         .epsilon = plan->epsilon,
         .error_predicted = plan->error_predicted,
         .truncation_error = plan->truncation_error,
         .aliasing_error = plan->aliasing_error,
+        .blur_error = plan->blur_error,
         .banding_error = plan->banding_error,
         .table_error = plan->table_error,
         .band_count = plan->band_count,
         .r_max_mm = is_splatted ? plan->r_max_mm : 0,
         .spacing_mm = is_splatted ? plan->spacing_mm : 0,
-        .sample_count = render_executor_samples(renderer->executor)->count,
-        .splat_count = render_executor_splat_count(renderer->executor),
+        .sample_count = splatter ? render_splatter_sample_count(splatter) : 0,
+        .splat_count = splatter ? render_splatter_splat_count(splatter) : 0,
         .view_count = plan->view_count,
+        .map_count = (int)plan->map_count,
+        .map_side_px = render_plan_map_side_px(plan),
         .effect_count = plan->effect_count,
         .note_count = plan->note_count,
     };
     for (size_t e = 0; e < plan->effect_count; e++) {
         report->effects[e].name = render_effects[e]->name;
         report->effects[e].is_active = plan->decisions[e].is_active;
+        report->effects[e].predicted_ms = plan->decisions[e].cost_ms;
+        report->effects[e].error = plan->decisions[e].error;
         report->effects[e].time_ms = time_ms[e];
         memcpy(report->effects[e].reason, plan->decisions[e].reason, sizeof report->effects[e].reason);
     }
     memcpy(report->notes, plan->notes, sizeof report->notes);
 }
 
-static void set_attributes(struct io_image *image, const struct io_scene *scene,
-                           const struct render_plan *plan)
+/* Names of the media, between commas. */
+static const char *list_materials(const struct render_media *media, char *names, size_t size)
 {
+    names[0] = '\0';
+    for (size_t m = 0; m < media->count; m++) {
+        const size_t length = strlen(names);
+        snprintf(names + length, size - length, "%s%s", m > 0 ? "," : "", media->media[m].material->name);
+    }
+    return names;
+}
+
+static void set_attributes(struct io_image *image, const struct render_plan *plan)
+{
+    char names[512];
     io_image_set_text(image, "dipole:kind", "picture");
     io_image_set_text(image, "dipole:version", dipole_version());
     io_image_set_text(image, "dipole:technique", render_technique_names[plan->technique]);
-    io_image_set_text(image, "dipole:material", scene->objects[0].material.name);
+    io_image_set_text(image, "dipole:material", list_materials(plan->media, names, sizeof names));
     io_image_set_number(image, "dipole:epsilon", plan->epsilon);
     if (render_plan_reads(plan, "light_samples")) {
         io_image_set_number(image, "dipole:error_predicted", plan->error_predicted);
         io_image_set_number(image, "dipole:r_max_mm", plan->r_max_mm);
         io_image_set_number(image, "dipole:spacing_mm", plan->spacing_mm);
+        io_image_set_number(image, "dipole:blur_error", plan->blur_error);
         io_image_set_number(image, "dipole:banding_error", plan->banding_error);
         io_image_set_number(image, "dipole:table_error", plan->table_error);
     }
@@ -143,12 +184,18 @@ static void set_attributes(struct io_image *image, const struct io_scene *scene,
 bool render_draw(struct renderer *renderer, const struct render_options *options,
                  struct io_image **image_out, struct render_report *report_out, dipole_status *status)
 {
+    if (options->technique == RENDER_TECHNIQUE_REFERENCE)
+        return false;
     const double start_ms = now_ms();
     const struct render_request request = {
         .scene = renderer->scene,
         .technique = options->technique,
+        .area = options->area,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
-        .table = options->table,
+        .media = renderer->media,
+        .tables = options->tables,
+        .volumes = options->volumes,
+        .tsm = options->tsm,
         .is_tone_mapped = options->is_tone_mapped,
     };
     double time_ms[RENDER_EFFECT_LIMIT];
@@ -161,7 +208,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         render_executor_read(renderer->executor, options->is_tone_mapped ? "display" : "radiance",
                              image->pixels, status);
     if (done) {
-        set_attributes(image, renderer->scene, plan);
+        set_attributes(image, plan);
         *image_out = image;
     } else {
         io_image_destroy(image);
@@ -262,7 +309,12 @@ bool render_capture_create(struct renderer *renderer, double spacing_mm,
     *capture_out = NULL;
     if (!(spacing_mm > 0))
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "spacing_mm is %g, expected > 0", spacing_mm);
+    if (renderer->media->count > 1)
+        return dipole_fail(status, DIPOLE_BAD_VALUE, &(dipole_place){ .source = renderer->scene->path },
+                           "the scene's objects are of %zu different materials, expected one",
+                           renderer->media->count);
     const struct render_request request = { .scene = renderer->scene,
+                                            .media = renderer->media,
                                             .technique = RENDER_TECHNIQUE_SPLAT,
                                             .epsilon = RENDER_EPSILON_DEFAULT,
                                             .spacing_mm = spacing_mm,
@@ -281,9 +333,12 @@ bool render_capture_create(struct renderer *renderer, double spacing_mm,
     done = done && capture_read(renderer, plan, rgba, capture, status);
     if (done) {
         /* The executor makes new samples in its next run: these are the capture's now. */
-        struct render_light_samples *const samples = render_executor_samples(renderer->executor);
-        capture->samples = *samples;
-        *samples = (struct render_light_samples){ 0 };
+        struct render_splatter *const splatter = render_executor_splatter(renderer->executor);
+        if (splatter) { /* else no light shines */
+            struct render_light_samples *const samples = render_splatter_samples(splatter, 0);
+            capture->samples = *samples;
+            *samples = (struct render_light_samples){ 0 };
+        }
         *capture_out = capture;
     } else {
         render_capture_destroy(capture);

@@ -6,6 +6,7 @@
 #include "io/scene_file.h"
 #include "lutgen/lut.h"
 #include "renderer/light_samples.h"
+#include "renderer/media.h"
 
 /* Where OpenGL 4.5 comes from. The default tries OSMesa, then EGL. */
 enum render_context_kind {
@@ -15,9 +16,22 @@ enum render_context_kind {
     RENDER_CONTEXT_WINDOW, /* GLFW, hidden; needs a display */
 };
 
-/* The default takes splats, or Lambert where scattering stays within a pixel. */
-enum render_technique { RENDER_TECHNIQUE_AUTO = 0, RENDER_TECHNIQUE_SPLAT, RENDER_TECHNIQUE_LAMBERT };
-extern const char *const render_technique_names[]; /* "auto", "splat", "lambert", NULL */
+/* The default takes splats, or Lambert where scattering stays within a pixel. The reference (reference.h)
+ * is slow and exact, and needs no OpenGL. */
+enum render_technique {
+    RENDER_TECHNIQUE_AUTO = 0,
+    RENDER_TECHNIQUE_SPLAT,
+    RENDER_TECHNIQUE_LAMBERT,
+    RENDER_TECHNIQUE_REFERENCE,
+    RENDER_TECHNIQUE_TSM, /* translucent shadow maps; never taken by default */
+};
+/* "auto", "splat", "lambert", "reference", "tsm", NULL */
+extern const char *const render_technique_names[];
+
+/* How a splat knows the area that its sample stands for: by the flux of its texels, which needs no area; or
+ * as in the paper, its disc of r_max over the number of samples that overlap a pixel, for comparison. */
+enum render_area { RENDER_AREA_FLUX = 0, RENDER_AREA_OVERLAP };
+extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 
 /* epsilon: asked relative error of the radiosity. */
 #define RENDER_EPSILON_DEFAULT 0.01
@@ -28,48 +42,109 @@ extern const char *const render_technique_names[]; /* "auto", "splat", "lambert"
 enum { RENDER_SIDE_LIMIT = 16384 };
 #define RENDER_PIXEL_LIMIT ((size_t)1 << 24)
 
+/* So many light samples at the most, whatever epsilon asks for, 32 bytes each: so many texels do all
+ * lights' views have, unless there are very many lights. */
+#define RENDER_LIGHT_SAMPLE_LIMIT ((size_t)1 << 25)
+
 /* Draws one scene, any number of times. End it with render_destroy. */
 struct renderer;
 
 /*
  * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
  * and lights may change between calls, its objects may not.
- * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed),
- * DIPOLE_BAD_VALUE (objects of different media) or DIPOLE_OUT_OF_MEMORY.
+ * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed) or
+ * DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                                   struct renderer **renderer_out, dipole_status *status);
 void render_destroy(struct renderer *renderer);
 
-struct render_options {
-    enum render_technique technique;
-    double epsilon;                /* 0: RENDER_EPSILON_DEFAULT                              */
-    const struct lut_splat *table; /* of the scene's medium; NULL: baked in memory           */
-    bool is_tone_mapped;           /* 0..1 over the scene's background, for a PNG; else
-                                      linear radiance, premultiplied by coverage (alpha)     */
+/* Called now and then with the part that is done, 0 to 1, from the thread that draws. */
+struct render_progress {
+    void (*show)(void *context, const char *what, double fraction); /* NULL: nobody watches */
+    void *context;
 };
 
-enum { RENDER_EFFECT_LIMIT = 16, RENDER_NOTE_LIMIT = 4 };
+/* Where the global response is gathered: at each fragment, or at the meshes' vertices and interpolated. */
+enum render_tsm_gather { RENDER_TSM_FRAGMENT = 0, RENDER_TSM_VERTEX };
+extern const char *const render_tsm_gather_names[]; /* "fragment", "vertex", NULL */
+
+/*
+ * What is summed. TABLE: the samples of the pattern, each looked up in a volume. EXACT: the same without a
+ * table. TEXELS: the 3D form of theory.md T30 over all texels of the map. PROFILE: R_d of the distance over
+ * all texels, which is what splats sum. From one to the next one source of error goes: the table, the
+ * samples, the form.
+ */
+enum render_tsm_response {
+    RENDER_TSM_TABLE = 0,
+    RENDER_TSM_EXACT,
+    RENDER_TSM_TEXELS,
+    RENDER_TSM_PROFILE,
+};
+extern const char *const render_tsm_response_names[]; /* "table", "exact", "texels", "profile", NULL */
+
+/* Which part of the response; all of it when texels are summed. */
+enum render_tsm_part { RENDER_TSM_SUM = 0, RENDER_TSM_GLOBAL, RENDER_TSM_LOCAL };
+extern const char *const render_tsm_part_names[]; /* "sum", "global", "local", NULL */
+
+/* Of translucent shadow maps alone. */
+struct render_tsm_options {
+    enum render_tsm_gather gather;
+    enum render_tsm_response response;
+    enum render_tsm_part part;
+    int sample_count; /* of the pattern: 13, 21, 53, 117 or 245; 0: 21, or what the volumes have */
+    int layer_count;  /* 0: all between a point and where its light entered is taken for solid; else so many
+                         surfaces behind each other, even, up to RENDER_TSM_LAYER_LIMIT, tell what is air */
+};
+enum { RENDER_TSM_LAYER_LIMIT = 16 };
+
+struct render_options {
+    enum render_technique technique;
+    double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
+    enum render_area area;
+    const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
+    const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
+    struct render_tsm_options tsm;
+    bool is_tone_mapped; /* 0..1 over the scene's background, for a PNG; else
+                            linear radiance, premultiplied by coverage (alpha)  */
+
+    /* Of the reference alone. */
+    struct render_progress progress;
+    int thread_count;    /* 0: as many as processors; the picture does not depend on it */
+    size_t sample_limit; /* 0: RENDER_REFERENCE_SAMPLE_LIMIT                            */
+};
+
+enum { RENDER_EFFECT_LIMIT = 32, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
+
+/* One step of the reference: surface samples so far, and the error estimated from them. */
+struct render_doubling {
+    size_t sample_count;
+    double error;
+};
 
 struct render_effect_report {
     const char *name;
     bool is_active;
     char reason[160];
-    double time_ms;
+    double predicted_ms, time_ms;
+    double error; /* predicted, that it leaves */
 };
 
 /* What was done, why, and how long it took. */
 struct render_report {
     enum render_technique technique; /* never AUTO */
     double epsilon;
-    double error_predicted; /* the sum of these four */
-    double truncation_error, aliasing_error, banding_error, table_error;
+    double error_predicted; /* the sum of these five; of the reference estimated; INFINITY: not bounded */
+    double truncation_error, aliasing_error, blur_error, banding_error, table_error;
     double r_max_mm, spacing_mm; /* 0 when not splatted */
     size_t sample_count;         /* at the finest */
     size_t splat_count, view_count;
     int band_count;
+    int map_count, map_side_px; /* translucent shadow maps, and the side of the largest */
     struct render_effect_report effects[RENDER_EFFECT_LIMIT];
     size_t effect_count;
+    struct render_doubling doublings[RENDER_DOUBLING_LIMIT]; /* of the reference */
+    size_t doubling_count;
     double total_ms;
     char notes[RENDER_NOTE_LIMIT][256]; /* promises that could not be kept */
     size_t note_count;
@@ -100,7 +175,8 @@ struct render_capture {
     struct render_light_samples samples; /* spacing_mm apart or less                                */
 };
 
-/* Fails as render_draw does; the caller ends *capture_out with render_capture_destroy. spacing_mm > 0. */
+/* Fails as render_draw does; the caller ends *capture_out with render_capture_destroy. spacing_mm > 0;
+ * samples are farther apart where they would be more than RENDER_LIGHT_SAMPLE_LIMIT. */
 DIPOLE_CHECKED bool render_capture_create(struct renderer *renderer, double spacing_mm,
                                           struct render_capture **capture_out, dipole_status *status);
 void render_capture_destroy(struct render_capture *capture);

@@ -4,13 +4,17 @@
 
 #include "renderer/context.h"
 #include "renderer/execute.h"
+#include "renderer/tables.h"
+#include "renderer/volumes.h"
 
 struct renderer {
     const struct io_scene *scene;
     struct render_context *context;
     struct render_gl_errors errors;
     struct render_executor *executor;
-    struct lut_splat *table; /* baked when a plan first needed one */
+    struct render_media *media;
+    struct render_tables *tables;   /* baked when a plan first needed them, to the finest asked so far */
+    struct render_volumes *volumes; /* the same                                                 */
 };
 
 DIPOLE_CHECKED bool render_make_current(struct renderer *renderer, dipole_status *status);

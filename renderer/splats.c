@@ -38,7 +38,8 @@ static size_t group_end(const struct render_light_samples *samples, size_t first
     while (end < samples->count && end - first < RENDER_SPLAT_SAMPLES) {
         struct box grown = *box;
         box_add(&grown, samples->samples[end].position_mm);
-        if (end > first && box_radius_mm(&grown) > radius_limit_mm)
+        if (end > first && (samples->samples[end].object != samples->samples[first].object ||
+                            box_radius_mm(&grown) > radius_limit_mm))
             break;
         *box = grown;
         end++;
@@ -46,18 +47,29 @@ static size_t group_end(const struct render_light_samples *samples, size_t first
     return end;
 }
 
-bool render_splats_create(const struct render_light_samples *samples,
-                          const struct render_projection *camera, double r_max_mm,
-                          struct render_splats *out, dipole_status *status)
+static bool reserve(struct render_splats *splats, size_t more, dipole_status *status)
 {
-    *out = (struct render_splats){ 0 };
-    struct box box;
-    size_t capacity = 0;
-    for (size_t first = 0; first < samples->count; capacity++)
-        first = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
-    out->splats = calloc(capacity + 1, sizeof *out->splats);
-    if (!out->splats)
+    if (splats->capacity - splats->count >= more)
+        return true;
+    const size_t capacity = splats->count + more + splats->capacity / 2;
+    struct render_splat *const grown = realloc(splats->splats, capacity * sizeof *grown);
+    if (!grown)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu splats", capacity);
+    splats->splats = grown;
+    splats->capacity = capacity;
+    return true;
+}
+
+bool render_splats_append(struct render_splats *out, const struct render_light_samples *samples,
+                          size_t first_sample, const struct render_projection *camera, double r_max_mm,
+                          const struct render_splat_profile *profile, dipole_status *status)
+{
+    struct box box;
+    size_t group_count = 0;
+    for (size_t first = 0; first < samples->count; group_count++)
+        first = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
+    if (!reserve(out, group_count, status))
+        return false;
     for (size_t first = 0, end; first < samples->count; first = end) {
         end = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
         double centre_mm[3], in_view_mm[3], rectangle[4];
@@ -68,14 +80,16 @@ bool render_splats_create(const struct render_light_samples *samples,
             continue;
         render_projection_to_view(camera, centre_mm, in_view_mm);
         struct render_splat *const splat = &out->splats[out->count++];
+        *splat = (struct render_splat){ .first = (uint32_t)(first_sample + first),
+                                        .count = (uint32_t)(end - first),
+                                        .object = samples->samples[first].object,
+                                        .profile = *profile };
         for (int k = 0; k < 4; k++)
             splat->rectangle[k] = (float)rectangle[k];
         for (int k = 0; k < 3; k++)
             splat->centre_mm[k] = (float)centre_mm[k];
         splat->reach2_mm2 = (float)(reach_mm * reach_mm);
         splat->depth = (float)render_projection_linear_depth(camera, in_view_mm[2] - reach_mm);
-        splat->first = (uint32_t)first;
-        splat->count = (uint32_t)(end - first);
     }
     return true;
 }

@@ -208,7 +208,8 @@ static bool show(struct view *view, bool is_coarse, dipole_status *status)
     const struct render_request request = { .scene = view->scene,
                                             .technique = view->drawing.technique,
                                             .epsilon = view->drawing.epsilon,
-                                            .table = view->drawing.table,
+                                            .media = view->renderer->media,
+                                            .tables = view->drawing.tables,
                                             .is_tone_mapped = true };
     double time_ms[RENDER_EFFECT_LIMIT];
     struct render_plan *plan = NULL;

@@ -80,6 +80,8 @@ static inline bool scene_add(struct test_scene *test, enum io_primitive primitiv
             test->scene.min_mm[k] = fmin(test->scene.min_mm[k], (double)*p);
             test->scene.max_mm[k] = fmax(test->scene.max_mm[k], (double)*p);
         }
+        mesh->min[k] = (float)((double)mesh->min[k] * scale_mm + (k == 0 ? x_mm : 0));
+        mesh->max[k] = (float)((double)mesh->max[k] * scale_mm + (k == 0 ? x_mm : 0));
     }
     return true;
 }

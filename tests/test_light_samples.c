@@ -31,7 +31,8 @@ static struct render_light_samples reduce(const float *texels, double spacing_mm
         .texels = texels, .size_px = SIDE, .forward = { 0, 0, -1 }, .rgb = { 1, 2, 4 }, .levels = LEVELS
     };
     struct render_light_samples samples = { 0 };
-    assert_true(render_light_samples_append(&samples, &view, spacing_mm, NULL));
+    const struct render_light_target target = { &samples, spacing_mm };
+    assert_true(render_light_samples_append(&target, &view, NULL));
     return samples;
 }
 

@@ -1,63 +1,13 @@
 /* renderer/render.h: pictures against sums and integrals that were not drawn. */
 #include "check.h"
-#include "scenes.h"
+#include "drawing.h"
+#include "sphere_oracle.h"
 
 #include "renderer/gl.h"
 #include "renderer/render.h"
 #include "renderer/renderer.h"
 
-static const double PI = 3.14159265358979323846;
-
 /* ---- what the tests share ----------------------------------------------------------------------- */
-
-static struct renderer *renderer_of(const struct test_scene *test, enum render_context_kind kind)
-{
-    struct renderer *renderer;
-    dipole_status status;
-    if (!render_create(&test->scene, kind, &renderer, &status))
-        fail_msg("%s", status.message);
-    return renderer;
-}
-
-static struct io_image *draw(struct renderer *renderer, const struct render_options *options,
-                             struct render_report *report)
-{
-    struct io_image *image;
-    dipole_status status;
-    if (!render_draw(renderer, options, &image, report, &status))
-        fail_msg("%s", status.message);
-    return image;
-}
-
-static struct render_capture *capture(struct renderer *renderer, double spacing_mm)
-{
-    struct render_capture *captured;
-    dipole_status status;
-    if (!render_capture_create(renderer, spacing_mm, &captured, &status))
-        fail_msg("%s", status.message);
-    return captured;
-}
-
-/* Sums of squares of a picture's values and of their errors, over the exact pixels. */
-struct deviation {
-    double error2, value2, worst, peak;
-    size_t count;
-};
-
-static void deviation_add(struct deviation *deviation, double found, double expected)
-{
-    deviation->error2 += (found - expected) * (found - expected);
-    deviation->value2 += expected * expected;
-    deviation->worst = fmax(deviation->worst, fabs(found - expected));
-    deviation->peak = fmax(deviation->peak, fabs(expected));
-    deviation->count++;
-}
-
-static double relative_rmse(const struct deviation *deviation)
-{
-    assert_true(deviation->count > 300);
-    return sqrt(deviation->error2 / deviation->value2);
-}
 
 /* A lit scene of one object; true with a back light. */
 static void init_lit(struct test_scene *test, enum io_primitive primitive, double scale_mm, bool is_back,
@@ -154,34 +104,6 @@ static void splats_are_near_the_sum_without_a_cut(void **state)
 
 /* ---- integrals ---------------------------------------------------------------------------------- */
 
-enum { QUADRATURE_POINTS = 30000 };
-
-/* Radiosity at a point of a sphere lit from the direction -toward_light, channel by channel: the integral
- * over the lit hemisphere on a Fibonacci lattice, which is uniform in area to better than 0.1 %. */
-static void sphere_radiosity(const float position_mm[3], double radius_mm, const double toward_light[3],
-                             double irradiance, const dipole_coefficients k[3], double radiosity[3])
-{
-    const double golden_rad = PI * (3 - sqrt(5));
-    const double area_mm2 = 4 * PI * radius_mm * radius_mm / QUADRATURE_POINTS;
-    memset(radiosity, 0, 3 * sizeof *radiosity);
-    for (int i = 0; i < QUADRATURE_POINTS; i++) {
-        const double z = 1 - (2 * i + 1.0) / QUADRATURE_POINTS, rho = sqrt(1 - z * z);
-        const double n[3] = { rho * cos(golden_rad * i), rho * sin(golden_rad * i), z };
-        const double cosine = n[0] * toward_light[0] + n[1] * toward_light[1] + n[2] * toward_light[2];
-        if (cosine <= 0)
-            continue;
-        const double flux_w =
-            irradiance * cosine * area_mm2 * (1 - dipole_fresnel_reflectance(k[0].eta, cosine));
-        double r2 = 0;
-        for (int a = 0; a < 3; a++) {
-            const double d = (double)position_mm[a] - radius_mm * n[a];
-            r2 += d * d;
-        }
-        for (int c = 0; c < 3; c++)
-            radiosity[c] += flux_w * dipole_rd_per_mm2(&k[c], sqrt(r2));
-    }
-}
-
 /* Oracle: the surface integral over the sphere, by a quadrature that knows neither light view nor mesh. */
 static void splats_approach_the_surface_integral(void **state)
 {
@@ -206,8 +128,9 @@ static void splats_approach_the_surface_integral(void **state)
             double radiosity[3];
             if (captured->coverage[i] < 1)
                 continue;
-            sphere_radiosity(captured->position_mm + 3 * i, radius_mm, toward_light, test.lights[0].rgb[0],
-                             k, radiosity);
+            const float *const p = captured->position_mm + 3 * i;
+            const double position_mm[3] = { (double)p[0], (double)p[1], (double)p[2] };
+            sphere_radiosity(position_mm, radius_mm, toward_light, test.lights[0].rgb[0], k, radiosity);
             for (int c = 0; c < 3; c++)
                 deviation_add(&deviation, (double)image->pixels[4 * i + (size_t)c],
                               (double)captured->exit_per_sr[i] * radiosity[c]);
@@ -646,10 +569,11 @@ static void bind_table(GLuint program)
 {
     const struct lut_axis *const axis = &strip_axis;
     const double end = axis->r_max_mm / axis->scale_mm;
+    const double row[3] = { 0, 1 / (axis->scale_mm * axis->scale_mm),
+                            (axis->node_count - 1) / log2(1 + end * end) };
     render_set_int(program, "profile_table", 0);
     render_set_int(program, "profile_last_node", axis->node_count - 1);
-    render_set_float(program, "profile_inverse_scale2", 1 / (axis->scale_mm * axis->scale_mm));
-    render_set_float(program, "profile_nodes_per_log2", (axis->node_count - 1) / log2(1 + end * end));
+    render_set_vec3(program, "profile", row);
     render_set_float(program, "r_max_mm", axis->r_max_mm);
 }
 
@@ -657,14 +581,16 @@ static void bind_table(GLuint program)
 static void profile_in_glsl_is_that_of_the_table(void **state)
 {
     (void)state;
-    static const struct render_shader shader = { "profile_strip.frag",
-                                                 "#include \"common/profile.glsl\"\n"
-                                                 "layout(location = 0) out vec4 value;\n"
-                                                 "uniform float r_max_mm;\n"
-                                                 "void main() {\n"
-                                                 "  float r_mm = r_max_mm * gl_FragCoord.x / 512.0;\n"
-                                                 "  value = vec4(profile_per_mm2(r_mm * r_mm), r_mm);\n"
-                                                 "}\n" };
+    static const struct render_shader shader = {
+        "profile_strip.frag", "#include \"common/profile.glsl\"\n"
+                              "layout(location = 0) out vec4 value;\n"
+                              "uniform float r_max_mm;\n"
+                              "uniform vec3 profile;\n"
+                              "void main() {\n"
+                              "  float r_mm = r_max_mm * gl_FragCoord.x / 512.0;\n"
+                              "  value = vec4(profile_per_mm2(r_mm * r_mm, profile), r_mm);\n"
+                              "}\n"
+    };
     struct test_scene test;
     const struct io_material material = skin1();
     init_lit(&test, IO_PRIMITIVE_CUBE, 5, false, &material);
@@ -674,7 +600,8 @@ static void profile_in_glsl_is_that_of_the_table(void **state)
     assert_true(lut_splat_bake(
         &(struct lut_request){ .materials = &material, .material_count = 1, .epsilon = 0.001 }, &table,
         NULL));
-    strip_axis = render_bands_axis(table);
+    const struct render_band_source source = { .table = table };
+    strip_axis = render_bands_axis(&source);
     static float nodes[3 * 8193];
     assert_true(strip_axis.node_count <= 8193);
     for (int i = 0; i < strip_axis.node_count; i++) {
@@ -715,8 +642,10 @@ static void every_shader_compiles_and_errors_are_placed(void **state)
     init_lit(&test, IO_PRIMITIVE_CUBE, 5, false, &material);
     struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
     assert_true(render_make_current(renderer, NULL));
-    static const char *const defines[] = { NULL, "#define HAS_RADIOSITY\n",
-                                           "#define HAS_RADIOSITY\n#define HAS_SPECULAR\n" };
+    static const char *const defines[] = {
+        NULL, "#define HAS_RADIOSITY\n", "#define HAS_RADIOSITY\n#define HAS_SPECULAR\n",
+        "#define HAS_RADIOSITY\n#define HAS_OBJECT_MEDIA\n#define HAS_LIGHT_OBJECT\n"
+    };
     size_t fragment_count = 0;
     for (const struct render_shader *shader = render_shaders; shader->name; shader++) {
         const char *const suffix = strstr(shader->name, ".frag");
@@ -726,7 +655,7 @@ static void every_shader_compiles_and_errors_are_placed(void **state)
         char name[64];
         snprintf(name, sizeof name, "%.*s.vert", (int)(suffix - shader->name), shader->name);
         const struct render_shader *const own = render_shader_find(name);
-        for (int d = 0; d < 3; d++) {
+        for (size_t d = 0; d < sizeof defines / sizeof *defines; d++) {
             GLuint program;
             dipole_status status;
             if (!render_program_create(own ? own : render_shader_find("fullscreen.vert"), shader,

@@ -276,6 +276,301 @@ static void bundled_scenes_are_read(void **state)
     assert_true(count >= 4);
 }
 
+/* ---- cameras, environment, frames ---------------------------------------------------------------- */
+
+/* A scene with cameras on line 2. */
+static void write_cameras(const char *cameras)
+{
+    char text[16384];
+    snprintf(text, sizeof text,
+             "{\n\"cameras\": %s,\n\"lights\": [" LIGHT "],\n\"objects\": [{" OBJECT "}]\n}\n", cameras);
+    write_text(PATH, text);
+}
+
+/* Oracle: the file. The one that is named is taken, without a name the first. */
+static void a_camera_is_chosen_by_name(void **state)
+{
+    (void)state;
+    write_cameras("[{\"name\": \"front\", \"eye\": [0, 0, 10], \"target\": [0, 0, 1]},"
+                  " {\"name\": \"side\", \"eye\": [20, 0, 0], \"target\": [0, 0, 0], \"height\": 4}]");
+    struct io_scene *scene = read_path(PATH, NULL);
+    assert_true(scene->camera.eye_mm[2] == 10 && !scene->camera.is_orthographic);
+    io_scene_destroy(scene);
+    scene = read_path(PATH, &(struct io_scene_options){ .camera_name = "front" });
+    assert_true(scene->camera.eye_mm[2] == 10);
+    io_scene_destroy(scene);
+    scene = read_path(PATH, &(struct io_scene_options){ .camera_name = "side", .width_px = 7 });
+    assert_true(scene->camera.eye_mm[0] == 20 && scene->camera.is_orthographic);
+    assert_int_equal(scene->camera.width_px, 7);
+    assert_int_equal(scene->camera.height_px, 600);
+    io_scene_destroy(scene);
+    assert_refused(PATH, &(struct io_scene_options){ .camera_name = "top" },
+                   "2:12: cameras has none named \"top\", expected one of front, side");
+    assert_refused(PATH, &(struct io_scene_options){ .camera_name = "" },
+                   "2:12: cameras has none named \"\", expected one of front, side");
+
+    /* a camera alone may have a name */
+    write_scene(PATH, &(struct parts){ .camera = "\"name\": \"front\", " CAMERA });
+    io_scene_destroy(read_path(PATH, NULL));
+    io_scene_destroy(read_path(PATH, &(struct io_scene_options){ .camera_name = "front" }));
+    assert_refused(PATH, &(struct io_scene_options){ .camera_name = "top" },
+                   "2:11: camera is named \"front\", but \"top\" is asked for");
+    write_scene(PATH, &(struct parts){ 0 });
+    assert_refused(PATH, &(struct io_scene_options){ .camera_name = "top" },
+                   "2:11: camera has no name, but \"top\" is asked for");
+}
+
+/* Oracle: the messages, word by word. A camera that is not chosen must be right too. */
+static void wrong_cameras_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *cameras, *expected;
+    } cases[] = {
+        { "{}", "2:12: cameras is an object, expected an array" },
+        { "[]", "2:12: cameras has 0 elements, expected 1 to 64" },
+        { "[3]", "2:13: cameras[0] is a number, expected an object" },
+        { "[{" CAMERA "}]", "2:13: cameras[0].name is missing, expected the camera's name" },
+        { "[{" CAMERA ", \"name\": \"\"}]", "2:62: cameras[0].name is empty, expected the camera's name" },
+        { "[{" CAMERA ", \"name\": 3}]", "2:62: cameras[0].name is a number, expected a string" },
+        { "[{\"name\": \"0123456789012345678901234567890123456789012345678901234567890123\", " CAMERA "}]",
+          "2:22: cameras[0].name has 64 bytes, expected at most 63" },
+        { "[{\"name\": \"a\", " CAMERA "}, {\"name\": \"b\", " CAMERA "}, {\"name\": \"a\", " CAMERA "}]",
+          "2:132: cameras[2].name is \"a\" as in cameras[0], expected another" },
+        { "[{\"name\": \"a\", " CAMERA "}, {\"name\": \"b\", \"eye\": [0, 0, 1]}]",
+          "2:68: cameras[1].target is missing, it is required here" },
+        { "[{\"name\": \"a\", " CAMERA ", \"fov\": 3}]",
+          "2:67: unknown key \"fov\" in cameras[0], expected eye, target, up, fov_y_deg, height, size, "
+          "name" },
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        write_cameras(cases[i].cameras);
+        assert_refused(PATH, NULL, cases[i].expected);
+    }
+    assert_parts_refused((struct parts){ .more = "\"cameras\": [{\"name\": \"a\", " CAMERA "}]" },
+                         "5:12: cameras stands beside camera, expected one of the two");
+    char many[8192] = "[";
+    for (int i = 0; i < 65; i++)
+        snprintf(many + strlen(many), sizeof many - strlen(many), "%s{\"name\": \"%d\", " CAMERA "}",
+                 i > 0 ? ", " : "", i);
+    strcat(many, "]");
+    write_cameras(many);
+    assert_refused(PATH, NULL, "2:12: cameras has 65 elements, expected 1 to 64");
+}
+
+/* Oracle: the file, and the defaults that docs/formats.md states. */
+static void an_environment_is_found(void **state)
+{
+    (void)state;
+    char expected[4096];
+    write_text("sky.exr", "");
+    write_text("sky.hdr", "");
+    assert_non_null(realpath("sky.exr", expected));
+    struct io_scene *scene = read_parts((struct parts){ 0 });
+    assert_false(scene->has_environment);
+    io_scene_destroy(scene);
+    scene = read_parts((struct parts){ .more = "\"environment\": {\"image\": \"sky.exr\"}" });
+    assert_true(scene->has_environment);
+    assert_int_equal(scene->light_count, 1);
+    assert_string_equal(scene->environment.path, expected);
+    for (int c = 0; c < 3; c++)
+        assert_true(scene->environment.rgb[c] == 1);
+    assert_true(scene->environment.rotate_rad == 0);
+    io_scene_destroy(scene);
+    /* it is light enough */
+    scene = read_parts(
+        (struct parts){ .lights = "",
+                        .more = "\"environment\": {\"image\": \"./sky.hdr\", \"scale\": [1, 2, 3], "
+                                "\"rotate_deg\": -90}" });
+    assert_int_equal(scene->light_count, 0);
+    for (int c = 0; c < 3; c++)
+        assert_true(scene->environment.rgb[c] == c + 1);
+    assert_close(scene->environment.rotate_rad, -3.14159265358979323846 / 2, 1e-15, "angle");
+    io_scene_set_frame(scene, 0);
+    io_scene_destroy(scene);
+    scene =
+        read_parts((struct parts){ .more = "\"environment\": {\"image\": \"sky.exr\", \"scale\": 0.5}" });
+    for (int c = 0; c < 3; c++)
+        assert_true(scene->environment.rgb[c] == 0.5);
+    io_scene_destroy(scene);
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* The cameras and lights of two states of one scene are at most so far apart. */
+static void assert_same_view(const struct io_camera *camera, const struct io_light *lights,
+                             const struct io_scene *scene, double tolerance_mm)
+{
+    assert_true(distance(camera->eye_mm, scene->camera.eye_mm) <= tolerance_mm);
+    assert_true(distance(camera->target_mm, scene->camera.target_mm) == 0);
+    assert_true(distance(camera->up, scene->camera.up) == 0);
+    assert_int_equal(camera->width_px, scene->camera.width_px);
+    for (size_t i = 0; i < scene->light_count; i++) {
+        assert_int_equal(lights[i].kind, scene->lights[i].kind);
+        assert_true(distance(lights[i].rgb, scene->lights[i].rgb) == 0);
+        assert_true(distance(lights[i].position_mm, scene->lights[i].position_mm) <= tolerance_mm);
+        assert_true(distance(lights[i].direction, scene->lights[i].direction) <= fmin(tolerance_mm, 1e-9));
+    }
+}
+
+/* Oracle: by hand, quarter turns. */
+static void frames_turn_camera_and_lights(void **state)
+{
+    (void)state;
+    struct io_scene *scene = read_parts((struct parts){
+        .camera = "\"eye\": [1, 2, 13], \"target\": [1, 2, 3]",
+        .lights = "{\"kind\": \"point\", \"position\": [5, 6, 3], \"intensity\": 1}, " LIGHT,
+        .more = "\"unit_mm\": 10, \"frames\": {\"count\": 4, \"camera_turn_deg\": 360, "
+                "\"lights_turn_deg\": -720}" });
+    assert_int_equal(scene->frames.count, 4);
+    /* from +z to +x, to -z, to -x: counter-clockwise seen from above */
+    const double eyes[4][3] = { { 10, 20, 130 }, { 110, 20, 30 }, { 10, 20, -70 }, { -90, 20, 30 } };
+    const double positions[2][3] = { { 50, 60, 30 }, { -30, 60, 30 } };
+    for (int frame = 0; frame < 4; frame++) {
+        io_scene_set_frame(scene, frame);
+        assert_true(distance(scene->camera.eye_mm, eyes[frame]) < 1e-12);
+        assert_true(distance(scene->lights[0].position_mm, positions[frame % 2]) < 1e-12);
+        assert_true(distance(scene->lights[0].direction, (double[3]){ 0, 0, 0 }) == 0);
+        const double direction[3] = { 0, 0, frame % 2 ? 1 : -1 };
+        assert_true(distance(scene->lights[1].direction, direction) < 1e-15);
+        assert_true(distance(scene->lights[1].position_mm, (double[3]){ 0, 0, 0 }) == 0);
+    }
+    io_scene_destroy(scene);
+
+    /* without turns, and without frames, nothing moves */
+    scene = read_parts((struct parts){ .more = "\"frames\": {\"count\": 100000}" });
+    const struct io_camera camera = scene->camera;
+    const struct io_light light = scene->lights[0];
+    io_scene_set_frame(scene, 99999);
+    assert_same_view(&camera, &light, scene, 0);
+    io_scene_destroy(scene);
+    scene = read_parts((struct parts){ 0 });
+    assert_int_equal(scene->frames.count, 1);
+    io_scene_set_frame(scene, 0);
+    assert_same_view(&camera, &light, scene, 0);
+    io_scene_destroy(scene);
+
+    /* --size counts in all frames */
+    write_scene(PATH, &(struct parts){ .more = "\"frames\": {\"count\": 2}" });
+    scene = read_path(PATH, &(struct io_scene_options){ .width_px = 5, .height_px = 4 });
+    io_scene_set_frame(scene, 1);
+    assert_int_equal(scene->camera.width_px, 5);
+    assert_int_equal(scene->camera.height_px, 4);
+    io_scene_destroy(scene);
+}
+
+/* A scene of 3 lights, its numbers by chance, of that many frames. */
+static struct io_scene *read_random_frames(struct rng *rng, int count, double turn_deg)
+{
+    double v[15];
+    char camera[512], lights[1024], more[256];
+    for (int i = 0; i < 15; i++)
+        v[i] = (uniform(rng, -1, 1) < 0 ? -1 : 1) * log_uniform(rng, 1e-3, 1e3);
+    snprintf(
+        camera, sizeof camera,
+        "\"eye\": [%.17g, %.17g, %.17g], \"target\": [%.17g, %.17g, %.17g], \"up\": [%.17g, %.17g, %.17g]",
+        v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8]);
+    snprintf(lights, sizeof lights,
+             "{\"kind\": \"point\", \"position\": [%.17g, %.17g, %.17g], \"intensity\": 1}, " LIGHT
+             ", {\"kind\": \"directional\", \"direction\": [%.17g, %.17g, %.17g], \"irradiance\": 1}",
+             v[9], v[10], v[11], v[12], v[13], v[14]);
+    snprintf(more, sizeof more,
+             "\"frames\": {\"count\": %d, \"camera_turn_deg\": %.17g, \"lights_turn_deg\": %.17g}", count,
+             turn_deg, -turn_deg);
+    return read_parts((struct parts){ .camera = camera, .lights = lights, .more = more });
+}
+
+/* The part of v across a unit axis, and its length; *along_out is the other part's. */
+static double across(const double v[3], const double axis[3], double out[3], double *along_out)
+{
+    *along_out = v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2];
+    for (int x = 0; x < 3; x++)
+        out[x] = v[x] - *along_out * axis[x];
+    return distance(out, (double[3]){ 0, 0, 0 });
+}
+
+/*
+ * Oracle: the definition of a turn about an axis through a centre. What is along the axis stays, what is
+ * across it keeps its length and turns by the angle, whose cosine and sine are products of before and
+ * after.
+ */
+static void assert_turned(const double before[3], const double after[3], const double centre[3],
+                          const double axis[3], double turn_deg, double tolerance_mm)
+{
+    const double angle_rad = turn_deg * 3.14159265358979323846 / 180;
+    const double u[3] = { before[0] - centre[0], before[1] - centre[1], before[2] - centre[2] },
+                 v[3] = { after[0] - centre[0], after[1] - centre[1], after[2] - centre[2] };
+    double p[3], q[3], u_along, v_along, cosine = 0, sine = 0;
+    const double radius_mm = across(u, axis, p, &u_along);
+    assert_true(fabs(across(v, axis, q, &v_along) - radius_mm) < tolerance_mm);
+    assert_true(fabs(v_along - u_along) < tolerance_mm);
+    for (int x = 0; x < 3; x++) {
+        const int y = (x + 1) % 3, z = (x + 2) % 3;
+        cosine += p[x] * q[x] / radius_mm;
+        sine += axis[x] * (p[y] * q[z] - p[z] * q[y]) / radius_mm;
+    }
+    assert_true(fabs(cosine - cos(angle_rad) * radius_mm) < tolerance_mm);
+    assert_true(fabs(sine - sin(angle_rad) * radius_mm) < tolerance_mm);
+}
+
+/* Oracle: the above on random scenes; and frame 0 is the file to the last bit, whatever was set before. */
+static void turning_keeps_what_it_must(void **state)
+{
+    (void)state;
+    static const double y[3] = { 0, 1, 0 }, origin[3] = { 0, 0, 0 };
+    struct rng rng = { .seed = 7 };
+    for (int i = 0; i < 200; i++) {
+        const int count = 1 + (int)uniform(&rng, 0, 50);
+        const double turn_deg = uniform(&rng, -1000, 1000);
+        struct io_scene *scene = read_random_frames(&rng, count, turn_deg);
+        const struct io_camera camera = scene->camera;
+        struct io_light lights[3];
+        memcpy(lights, scene->lights, sizeof lights);
+        const double up_length = distance(camera.up, origin), *const target = camera.target_mm;
+        const double up[3] = { camera.up[0] / up_length, camera.up[1] / up_length,
+                               camera.up[2] / up_length };
+        /* the rounding of a few sums of numbers of that size, and of an angle of up to 1000 degrees */
+        const double tolerance_mm = 1e-13 * (distance(camera.eye_mm, target) + distance(target, origin) +
+                                             distance(lights[0].position_mm, target));
+        for (int frame = 0; frame < count; frame++) {
+            const double angle_deg = turn_deg * frame / count;
+            io_scene_set_frame(scene, frame);
+            assert_turned(camera.eye_mm, scene->camera.eye_mm, target, up, angle_deg, tolerance_mm);
+            assert_turned(lights[0].position_mm, scene->lights[0].position_mm, target, y, -angle_deg,
+                          tolerance_mm);
+            assert_turned(lights[2].direction, scene->lights[2].direction, origin, y, -angle_deg, 1e-13);
+        }
+        io_scene_set_frame(scene, 0);
+        assert_same_view(&camera, lights, scene, 0);
+        io_scene_destroy(scene);
+    }
+}
+
+/* Oracle: a whole turn is none. The frame half way through two turns is the file to the last bit; one just
+ * beside it, within what it is beside. */
+static void whole_turns_are_none(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 8 };
+    for (int i = 1; i < 100; i++) {
+        for (int k = 0; k < 2; k++) {
+            const double beside = k * 1e-10;
+            struct io_scene *scene = read_random_frames(&rng, 2 * i, 720 * (1 + beside));
+            const struct io_camera camera = scene->camera;
+            struct io_light lights[3];
+            memcpy(lights, scene->lights, sizeof lights);
+            io_scene_set_frame(scene, i);
+            /* all lie within 4000 mm of the target; 2 pi times that, and the rounding */
+            assert_same_view(&camera, lights, scene, k * (4000 * 6.3 * beside + 1e-11));
+            io_scene_destroy(scene);
+        }
+    }
+}
+
 /* ---- scenes that are refused --------------------------------------------------------------------- */
 
 /* Oracle: the messages, word by word. */
@@ -290,7 +585,9 @@ static void file_that_is_no_scene_is_refused(void **state)
     write_text(PATH, "[]");
     assert_refused(PATH, NULL, "1:1: the whole is an array, expected an object");
     write_text(PATH, "{}");
-    assert_refused(PATH, NULL, "1:1: camera is missing, it is required here");
+    assert_refused(PATH, NULL, "1:1: lights is missing, it is required here");
+    write_text(PATH, "{\"lights\": [" LIGHT "], \"objects\": []}");
+    assert_refused(PATH, NULL, "1:1: camera is missing, expected it, or cameras");
 }
 
 /* Oracle: the messages, word by word, with the place that a hand count gives. */
@@ -303,8 +600,8 @@ static void wrong_values_are_refused(void **state)
     } cases[] = {
         /* the whole */
         { { .more = "\"light\": []" },
-          "5:1: unknown key \"light\", expected camera, lights, objects, unit_mm, background, "
-          "exposure_ev" },
+          "5:1: unknown key \"light\", expected lights, objects, camera, cameras, unit_mm, background, "
+          "exposure_ev, environment, frames" },
         { { .more = "\"unit_mm\": 0" }, "5:12: unit_mm is 0, expected 1e-06 to 1e+06" },
         { { .more = "\"unit_mm\": -1" }, "5:12: unit_mm is -1, expected 1e-06 to 1e+06" },
         { { .more = "\"unit_mm\": NaN" }, "5:14: JSON syntax: invalid token near 'NaN'" },
@@ -334,7 +631,7 @@ static void wrong_values_are_refused(void **state)
         { { .camera = CAMERA ", \"size\": [800]" },
           "2:60: camera.size has 1 element, expected an array of 2 numbers" },
         { { .camera = CAMERA ", \"fov\": 20" },
-          "2:52: unknown key \"fov\" in camera, expected eye, target, up, fov_y_deg, height, size" },
+          "2:52: unknown key \"fov\" in camera, expected eye, target, up, fov_y_deg, height, size, name" },
         /* lights */
         { { .lights = "" }, "3:11: lights has 0 elements, expected 1 to 64" },
         { { .lights = "3" }, "3:12: lights[0] is a number, expected an object" },
@@ -352,6 +649,44 @@ static void wrong_values_are_refused(void **state)
           "3:66: lights[0].intensity has 2 elements, expected an array of 3 numbers" },
         { { .lights = LIGHT ", {\"kind\": \"point\", \"position\": [0, 0, 1]}" },
           "3:79: lights[1].intensity is missing, it is required here" },
+        /* environment */
+        { { .more = "\"environment\": 3" }, "5:16: environment is a number, expected an object" },
+        { { .more = "\"environment\": {}" }, "5:16: environment.image is missing, it is required here" },
+        { { .more = "\"environment\": {\"image\": 3}" },
+          "5:26: environment.image is not a string, expected the path of a picture" },
+        { { .more = "\"environment\": {\"image\": \"sky.png\"}" },
+          "5:26: environment.image is \"sky.png\", expected a path that ends in .exr or .hdr" },
+        { { .more = "\"environment\": {\"image\": \"sky\"}" },
+          "5:26: environment.image is \"sky\", expected a path that ends in .exr or .hdr" },
+        { { .more = "\"environment\": {\"image\": \"absent.hdr\"}" },
+          "5:26: environment.image path \"absent.hdr\" cannot be read: No such file or directory" },
+        { { .more = "\"environment\": {\"image\": \"sky.exr\", \"scale\": -1}" },
+          "5:46: environment.scale is -1, expected 0 to 1e+12" },
+        { { .more = "\"environment\": {\"image\": \"sky.exr\", \"scale\": [1, 2]}" },
+          "5:46: environment.scale has 2 elements, expected an array of 3 numbers" },
+        { { .more = "\"environment\": {\"image\": \"sky.exr\", \"scale\": \"1\"}" },
+          "5:46: environment.scale is a string, expected an array of 3 numbers" },
+        { { .more = "\"environment\": {\"image\": \"sky.exr\", \"rotate_deg\": [0, 1, 0]}" },
+          "5:51: environment.rotate_deg is an array, expected a number" },
+        { { .more = "\"environment\": {\"image\": \"sky.exr\", \"rotate_deg\": 1e7}" },
+          "5:51: environment.rotate_deg is 1e+07, expected -1e+06 to 1e+06" },
+        { { .more = "\"environment\": {\"image\": \"sky.exr\", \"turn\": 1}" },
+          "5:37: unknown key \"turn\" in environment, expected image, scale, rotate_deg" },
+        /* frames */
+        { { .more = "\"frames\": 3" }, "5:11: frames is a number, expected an object" },
+        { { .more = "\"frames\": {\"camera_turn_deg\": 3}" },
+          "5:11: frames.count is missing, it is required here" },
+        { { .more = "\"frames\": {\"count\": 0}" }, "5:21: frames.count is 0, expected 1 to 100000" },
+        { { .more = "\"frames\": {\"count\": 100001}" },
+          "5:21: frames.count is 100001, expected 1 to 100000" },
+        { { .more = "\"frames\": {\"count\": 2.5}" },
+          "5:21: frames.count is 2.5, expected a whole number" },
+        { { .more = "\"frames\": {\"count\": 2, \"camera_turn_deg\": \"3\"}" },
+          "5:43: frames.camera_turn_deg is a string, expected a number" },
+        { { .more = "\"frames\": {\"count\": 2, \"lights_turn_deg\": -1e7}" },
+          "5:43: frames.lights_turn_deg is -1e+07, expected -1e+06 to 1e+06" },
+        { { .more = "\"frames\": {\"count\": 2, \"turn\": 3}" },
+          "5:24: unknown key \"turn\" in frames, expected count, camera_turn_deg, lights_turn_deg" },
         /* objects */
         { { .object = "" }, "4:13: objects[0].material is missing, it is required here" },
         { { .object = "\"material\": " MATERIAL },
@@ -404,6 +739,7 @@ static void wrong_values_are_refused(void **state)
                 "[0, 1, 2], \"sigma_s_prime_per_mm\": [1, 2, 3]}" },
           "4:68: objects[0].material.eta is 0, expected > 0 (0.1 to 10)" },
     };
+    write_text("sky.exr", "");
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
         assert_parts_refused(cases[i].parts, cases[i].expected);
 }
@@ -465,7 +801,19 @@ static void path_out_of_the_folder_is_refused(void **state)
         assert_refused("inside/scene.json", NULL, expected);
         io_scene_destroy(read_path("inside/scene.json", &options));
     }
-    /* a material's path is held to the same */
+    /* a picture's and a material's path are held to the same */
+    write_text("outside.hdr", "");
+    write_scene("inside/scene.json",
+                &(struct parts){ .more = "\"environment\": {\"image\": \"../outside.hdr\"}" });
+    assert_refused("inside/scene.json", NULL,
+                   "5:26: environment.image path \"../outside.hdr\" leads out of this file's folder, "
+                   "expected one inside, or --allow-path FOLDER");
+    io_scene_destroy(read_path("inside/scene.json", &options));
+    mkdir("inside/folder.exr", 0777);
+    write_scene("inside/scene.json",
+                &(struct parts){ .more = "\"environment\": {\"image\": \"folder.exr\"}" });
+    assert_refused("inside/scene.json", NULL,
+                   "5:26: environment.image is \"folder.exr\", which is no file");
     write_text("outside.json", MATERIAL);
     write_scene("inside/scene.json",
                 &(struct parts){ .object = "\"primitive\": \"cube\", \"material\": \"../outside.json\"" });
@@ -510,6 +858,12 @@ int main(void)
         cmocka_unit_test(fit_height_comes_before_the_rest),
         cmocka_unit_test(materials_come_in_three_ways),
         cmocka_unit_test(bundled_scenes_are_read),
+        cmocka_unit_test(a_camera_is_chosen_by_name),
+        cmocka_unit_test(wrong_cameras_are_refused),
+        cmocka_unit_test(an_environment_is_found),
+        cmocka_unit_test(frames_turn_camera_and_lights),
+        cmocka_unit_test(turning_keeps_what_it_must),
+        cmocka_unit_test(whole_turns_are_none),
         cmocka_unit_test(file_that_is_no_scene_is_refused),
         cmocka_unit_test(wrong_values_are_refused),
         cmocka_unit_test(wrong_mesh_is_refused),

@@ -1,5 +1,6 @@
 /* What the composite would do to the radiosity, kept as numbers: exit factor, coverage, and how much of the
  * pixel shows the surface that its radiosity was computed for. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -11,16 +12,23 @@ static struct render_decision decide(const struct render_request *request, const
     return request->is_captured ? render_called_for("asked for") : render_not_called_for("not asked for");
 }
 
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+           render_cost_ms(RENDER_COST_COMPOSITE_PIXEL, plan->covered_px);
+}
+
 static void bind(const struct render_frame *frame)
 {
     render_set_camera(frame->program, frame->plan);
-    render_set_exit(frame->program, frame->plan);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
     { .name = "capture",
       .draw = RENDER_DRAW_FULLSCREEN,
       .reads = { "surface_position_mm", "surface_normal", "position_mm", "normal" },
+      .reads_if_written = { "object_media" },
       .writes = { "capture" },
       .bind = bind },
 };
@@ -29,6 +37,7 @@ const struct render_effect render_effect_capture = {
     .name = "capture",
     .source = "the composite without scattering",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

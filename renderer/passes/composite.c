@@ -1,5 +1,6 @@
 /* The picture: radiosity leaves through the surface toward the eye (theory.md T14), specular light is
  * added, and the four points of each pixel are averaged. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -13,17 +14,23 @@ static struct render_decision decide(const struct render_request *request, const
     return render_called_for("4 points per pixel");
 }
 
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+           render_cost_ms(RENDER_COST_COMPOSITE_PIXEL, plan->covered_px);
+}
+
 static void bind(const struct render_frame *frame)
 {
     render_set_camera(frame->program, frame->plan);
-    render_set_exit(frame->program, frame->plan);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
     { .name = "composite",
       .draw = RENDER_DRAW_FULLSCREEN,
       .reads = { "surface_position_mm", "surface_normal", "position_mm", "normal" },
-      .reads_if_written = { "radiosity", "specular" },
+      .reads_if_written = { "radiosity", "specular", "object_media" },
       .writes = { "radiance" },
       .bind = bind },
 };
@@ -32,6 +39,7 @@ const struct render_effect render_effect_composite = {
     .name = "composite",
     .source = "Fresnel exit normalised to the radiosity",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

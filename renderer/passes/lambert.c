@@ -1,5 +1,6 @@
 /* Scattering that never leaves the spot: radiosity = total reflectance times irradiance that enters. What
  * an opaque material would show, and what is right where r_max is under a pixel. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -21,11 +22,16 @@ static struct render_decision decide(const struct render_request *request, const
     return render_called_for("scattered light stays within %.2g pixels", plan->r_max_px);
 }
 
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           (double)plan->view_count * render_cost_ms(RENDER_COST_SHADOW_PIXEL, plan->covered_px);
+}
+
 static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
-    render_set_vec3(frame->program, "diffuse_reflectance", frame->plan->diffuse_reflectance);
-    render_set_float(frame->program, "eta", frame->plan->eta);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
@@ -34,6 +40,7 @@ static const struct render_pass passes[] = {
       .is_per_view = true,
       .is_added = true,
       .reads = { "position_mm", "normal", "light_view" },
+      .reads_if_written = { "object_media" },
       .writes = { "radiosity" },
       .bind = bind },
 };
@@ -42,6 +49,7 @@ const struct render_effect render_effect_lambert = {
     .name = "lambert",
     .source = "Lambert 1760",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

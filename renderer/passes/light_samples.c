@@ -1,7 +1,8 @@
 /* The light's view, reduced to samples no farther apart than the profile's spectrum allows (theory.md T11,
  * T13). */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
-#include "renderer/execute.h"
+#include "renderer/splat_draw.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -19,19 +20,38 @@ static struct render_decision decide(const struct render_request *request, const
                              plan->aliasing_epsilon);
 }
 
+static double cost_ms(const struct render_plan *plan)
+{
+    return render_cost_ms(RENDER_COST_READ_TEXEL, render_cost_view_texels(plan));
+}
+
+static double error(const struct render_plan *plan)
+{
+    return plan->aliasing_error + plan->blur_error;
+}
+
+static bool sample(const struct render_frame *frame, dipole_status *status)
+{
+    struct render_splatter *splatter;
+    return render_executor_need_splatter(frame, &splatter, status) &&
+           render_splatter_sample_view(splatter, frame, status);
+}
+
 static const struct render_pass passes[] = {
     { .name = "light_samples",
       .draw = RENDER_DRAW_NOTHING,
       .is_per_view = true,
       .reads = { "light_view" },
       .writes = { "light_samples" },
-      .run = render_executor_sample_light_view },
+      .run = sample },
 };
 
 const struct render_effect render_effect_light_samples = {
     .name = "light_samples",
     .source = "Shah, Konttinen and Pattanaik 2009; spacing by the sampling theorem",
     .decide = decide,
+    .cost_ms = cost_ms,
+    .error = error,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

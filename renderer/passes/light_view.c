@@ -1,5 +1,6 @@
 /* What a light sees: the position of each texel's surface, and the share of the light's power that enters
  * there (theory.md T13). Both light samples and shadows are taken from it. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -9,11 +10,20 @@ static struct render_decision decide(const struct render_request *request, const
 {
     if (plan->lit_count == 0)
         return render_not_called_for("no light shines");
-    if (!plan->has_scattering && !plan->has_specular)
+    if (!plan->has_scattering && !plan->has_specular && !request->is_captured)
         return render_not_called_for("no channel scatters and no surface is glossy");
+    if (plan->technique == RENDER_TECHNIQUE_TSM && !plan->has_specular)
+        return render_not_called_for("translucent shadow maps are seen instead");
     return render_called_for("%zu of %zu lights shine, seen in %zu view%s of up to %d texels a side",
                              plan->lit_count, request->scene->light_count, plan->view_count,
                              plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           (double)plan->view_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
+           render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_view_texels(plan));
 }
 
 static void bind(const struct render_frame *frame)
@@ -24,7 +34,6 @@ static void bind(const struct render_frame *frame)
     render_set_light(frame->program, light);
     render_set_vec3(frame->program, "forward_ws", view->projection.forward);
     render_set_float(frame->program, "texel_area", view->texel_area);
-    render_set_float(frame->program, "eta", frame->plan->eta);
 }
 
 static const struct render_pass passes[] = {
@@ -32,6 +41,7 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_SCENE,
       .is_per_view = true,
       .writes = { "light_view" },
+      .writes_if_wanted = { "light_object", "light_irradiance" },
       .depth_written = "light_depth",
       .bind = bind },
 };
@@ -40,6 +50,7 @@ const struct render_effect render_effect_light_view = {
     .name = "light_view",
     .source = "reflective shadow maps, Dachsbacher and Stamminger 2005; flux instead of irradiance",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

@@ -37,8 +37,10 @@ void render_set_camera(GLuint program, const struct render_plan *plan)
     render_set_int(program, "height_px", plan->height_px);
 }
 
-void render_set_exit(GLuint program, const struct render_plan *plan)
+void render_set_medium(GLuint program, const struct render_plan *plan)
 {
-    render_set_float(program, "eta", plan->eta);
-    render_set_float(program, "exit_scale_per_sr", 1 / (PI * dipole_fdt_outside(plan->eta)));
+    const struct render_medium *const medium = &plan->media->media[0];
+    render_set_float(program, "eta", medium->eta);
+    render_set_float(program, "exit_scale_per_sr", 1 / (PI * dipole_fdt_outside(medium->eta)));
+    render_set_vec3(program, "diffuse_reflectance", medium->diffuse_reflectance);
 }

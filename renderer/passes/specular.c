@@ -1,4 +1,5 @@
 /* Light mirrored at the rough surface: GGX, with the shadows of the light's view (theory.md T19). */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -14,11 +15,17 @@ static struct render_decision decide(const struct render_request *request, const
     return render_called_for("an object is glossy");
 }
 
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           (double)plan->view_count * render_cost_ms(RENDER_COST_SHADOW_PIXEL, plan->covered_px);
+}
+
 static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
     render_set_camera(frame->program, frame->plan);
-    render_set_float(frame->program, "eta", frame->plan->eta);
+    render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
@@ -27,6 +34,7 @@ static const struct render_pass passes[] = {
       .is_per_view = true,
       .is_added = true,
       .reads = { "surface_position_mm", "surface_normal", "light_view" },
+      .reads_if_written = { "object_media" },
       .writes = { "specular" },
       .bind = bind },
 };
@@ -35,6 +43,7 @@ const struct render_effect render_effect_specular = {
     .name = "specular",
     .source = "GGX, Walter et al. 2007; height-correlated Smith, Heitz 2014",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

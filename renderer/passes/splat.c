@@ -1,7 +1,8 @@
 /* Subsurface scattering: every light sample adds flux times R_d(distance) to the pixels within r_max of it
  * (theory.md T14). */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
-#include "renderer/execute.h"
+#include "renderer/splat_draw.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -11,6 +12,8 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("captured without scattering");
     if (plan->technique != RENDER_TECHNIQUE_SPLAT)
         return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
+    if (plan->area != RENDER_AREA_FLUX)
+        return render_not_called_for("areas are counted: overlap");
     if (!plan->has_scattering)
         return render_not_called_for("no channel scatters");
     if (plan->lit_count == 0)
@@ -19,19 +22,41 @@ static struct render_decision decide(const struct render_request *request, const
                              plan->r_max_px);
 }
 
+static double cost_ms(const struct render_plan *plan)
+{
+    return RENDER_COST_PROGRAM_MS +
+           render_cost_ms(RENDER_COST_SPLAT_EVALUATION, render_cost_splat_evaluations(plan));
+}
+
+static double error(const struct render_plan *plan)
+{
+    return plan->truncation_error + plan->banding_error + plan->table_error;
+}
+
+static bool draw(const struct render_frame *frame, dipole_status *status)
+{
+    struct render_splatter *splatter;
+    return render_executor_need_splatter(frame, &splatter, status) &&
+           render_splatter_draw(splatter, frame, status);
+}
+
 static const struct render_pass passes[] = {
     { .name = "splat",
-      .draw = RENDER_DRAW_SPLATS,
+      .draw = RENDER_DRAW_BY_RUN,
       .is_added = true,
       .reads = { "position_mm", "light_samples" },
+      .reads_if_written = { "object_media" },
       .writes = { "radiosity" },
-      .depth_tested = "position_depth" },
+      .depth_tested = "position_depth",
+      .run = draw },
 };
 
 const struct render_effect render_effect_splat = {
     .name = "splat",
     .source = "Shah, Konttinen and Pattanaik 2009",
     .decide = decide,
+    .cost_ms = cost_ms,
+    .error = error,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

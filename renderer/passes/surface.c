@@ -1,4 +1,5 @@
 /* What the camera sees: positions and normals, four to a pixel; then one of them for each pixel. */
+#include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/execute.h"
 
@@ -9,6 +10,13 @@ static struct render_decision decide(const struct render_request *request, const
     (void)plan;
     return render_called_for("%zu object%s in the scene", request->scene->object_count,
                              request->scene->object_count == 1 ? "" : "s");
+}
+
+static double cost_ms(const struct render_plan *plan)
+{
+    return 2 * RENDER_COST_PROGRAM_MS +
+           render_cost_ms(RENDER_COST_TRIANGLE_4, (double)plan->triangle_count) +
+           render_cost_ms(RENDER_COST_SURFACE_PIXEL, render_cost_pixels(plan));
 }
 
 static void bind_surface(const struct render_frame *frame)
@@ -23,6 +31,7 @@ static void bind_resolve(const struct render_frame *frame)
     render_set_vec3(frame->program, "forward_ws", camera->forward);
     render_set_float(frame->program, "near_mm", camera->near_mm);
     render_set_float(frame->program, "far_mm", camera->far_mm);
+    render_set_camera(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
@@ -43,6 +52,7 @@ const struct render_effect render_effect_surface = {
     .name = "surface",
     .source = "deferred shading, Saito and Takahashi 1990",
     .decide = decide,
+    .cost_ms = cost_ms,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

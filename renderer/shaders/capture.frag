@@ -11,9 +11,9 @@ void main()
         if (point_mm.w == 0.0)
             continue;
         vec3 normal_ws = texelFetch(surface_normal, pixel, i).xyz;
-        capture.x += exit_per_sr(point_mm.xyz, normal_ws);
+        capture.x += exit_per_sr(point_mm, normal_ws);
         capture.y += 1.0;
-        capture.z += is_own(point_mm.xyz, normal_ws, pixel) ? 1.0 : 0.0;
+        capture.z += is_own(point_mm, normal_ws, pixel) ? 1.0 : 0.0;
     }
     capture /= 4.0;
 }

@@ -1,10 +1,9 @@
 // Pass lambert: radiosity += total reflectance times the irradiance that enters, of one light's view.
 #include "common/light.glsl"
 #include "common/fresnel.glsl"
+#include "common/medium.glsl"
 uniform sampler2D position_mm;
 uniform sampler2D normal;
-uniform vec3 diffuse_reflectance;
-uniform float eta;
 layout(location = 0) out vec4 radiosity_w_per_mm2;
 
 void main()
@@ -15,8 +14,8 @@ void main()
     float cosine = min(dot(normal_ws, toward(light, here_mm.xyz)), 1.0);
     radiosity_w_per_mm2 = vec4(0.0);
     if (here_mm.w > 0.0 && cosine > 0.0) {
-        float entering = cosine * (1.0 - fresnel_reflectance(eta, cosine));
-        radiosity_w_per_mm2.rgb = diffuse_reflectance * light_irradiance(here_mm.xyz) * entering *
+        float entering = cosine * (1.0 - fresnel_reflectance(medium_eta(here_mm.w), cosine));
+        radiosity_w_per_mm2.rgb = medium_diffuse_reflectance(here_mm.w) * light_irradiance(here_mm.xyz) * entering *
                                   light_visibility(here_mm.xyz, normal_ws);
     }
 }

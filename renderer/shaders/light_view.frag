@@ -8,15 +8,35 @@ in vec3 normal_ws;
 uniform vec4 light;         // w = 1: position, mm; w = 0: direction toward the light
 uniform vec3 forward_ws;
 uniform float texel_area;   // mm^2; point: at distance 1
-uniform float eta;
+uniform float object_eta;
 layout(location = 0) out vec4 position_and_share;
+#ifdef HAS_LIGHT_OBJECT
+uniform float object;  // number, from 1
+layout(location = 1) out float light_object;
+#endif
+#ifdef HAS_LIGHT_IRRADIANCE
+#ifdef HAS_LIGHT_OBJECT
+layout(location = 2) out float light_irradiance;  // that enters, per rgb of the light
+#else
+layout(location = 1) out float light_irradiance;
+#endif
+#endif
 
 void main()
 {
     vec3 to_light = toward(light, position_ws_mm);
-    float cosine = clamp(dot(normalize(normal_ws), to_light), 0.0, 1.0);
+    float cosine = clamp(dot(unit_or(normal_ws, to_light), to_light), 0.0, 1.0);
     float axis_cosine = light.w > 0.0 ? -dot(to_light, forward_ws) : 1.0;
     float size = texel_area * axis_cosine * axis_cosine * axis_cosine;
-    float share = gl_FrontFacing ? size * (1.0 - fresnel_reflectance(eta, cosine)) : 0.0;
+    float share = gl_FrontFacing ? size * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;
     position_and_share = vec4(position_ws_mm, share);
+#ifdef HAS_LIGHT_IRRADIANCE
+    vec3 step_mm = light.xyz - position_ws_mm;
+    float falloff = light.w > 0.0 ? 1.0 / max(dot(step_mm, step_mm), 1e-24) : 1.0;
+    light_irradiance =
+        gl_FrontFacing ? falloff * cosine * (1.0 - fresnel_reflectance(object_eta, cosine)) : 0.0;
+#endif
+#ifdef HAS_LIGHT_OBJECT
+    light_object = object;
+#endif
 }

@@ -3,9 +3,13 @@
 layout(location = 0) in vec4 rectangle;  // left, bottom, right, top in -1..1
 layout(location = 1) in float depth;     // 0..1
 layout(location = 2) in uvec2 range;     // first sample, how many
-layout(location = 3) in vec4 ball;       // middle of the samples, mm; reach from there, squared
+layout(location = 3) in float object;    // whose light it is, from 0
+layout(location = 4) in vec4 ball;       // middle of the samples, mm; reach from there, squared
+layout(location = 5) in vec4 profile;    // reach squared, first node, inverse scale squared, nodes per log2
 flat out ivec2 samples_of_splat;
 flat out vec4 ball_of_splat;
+flat out vec4 profile_of_splat;
+flat out float object_of_splat;
 
 void main()
 {
@@ -13,4 +17,6 @@ void main()
     gl_Position = vec4(mix(rectangle.xy, rectangle.zw, corner), 2.0 * depth - 1.0, 1.0);
     samples_of_splat = ivec2(range);
     ball_of_splat = ball;
+    profile_of_splat = profile;
+    object_of_splat = object;
 }

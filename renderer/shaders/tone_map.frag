@@ -10,7 +10,7 @@ void main()
 {
     const float knee = 0.6;
     vec4 over = texelFetch(radiance, ivec2(gl_FragCoord.xy), 0);
-    vec3 c = max(exposure * (over.rgb + (1.0 - over.a) * background), vec3(0.0));
+    vec3 c = clamp(exposure * (over.rgb + (1.0 - over.a) * background), vec3(0.0), vec3(1e30));
     float largest = max(max(c.r, c.g), c.b);
     if (largest > knee) {
         float bent = 1.0 - (1.0 - knee) * exp(-(largest - knee) / (1.0 - knee));

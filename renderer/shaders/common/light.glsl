@@ -24,7 +24,7 @@ vec3 light_irradiance(vec3 position_ws_mm)
     vec3 d = position_ws_mm - light.xyz;
     if (light_cube_face >= 0 && cube_face(d) != light_cube_face)
         return vec3(0.0);
-    return light_rgb / dot(d, d);
+    return light_rgb / max(dot(d, d), 1e-24);  // a light may stand on the surface
 }
 
 // Visible part of the light, over 4 x 4 texels. A texel is in the way if its surface is nearer to the light
@@ -33,9 +33,10 @@ vec3 light_irradiance(vec3 position_ws_mm)
 float light_visibility(vec3 position_ws_mm, vec3 normal_ws)
 {
     vec4 clip = light_view_projection * vec4(position_ws_mm, 1.0);
-    vec2 at = (0.5 * clip.xy / clip.w + 0.5) * float(light_view_size_px) - 0.5;
+    float depth = max(clip.w, 1e-30), size_px = float(light_view_size_px);
+    vec2 at = clamp((0.5 * clip.xy / depth + 0.5) * size_px - 0.5, -2.0, size_px + 2.0);
     vec3 to_light = toward(light, position_ws_mm);
-    float texel_mm = light_texel_mm * clip.w;
+    float texel_mm = light_texel_mm * depth;
     float cosine = max(dot(normal_ws, to_light), 0.05);
     float nearer_limit_mm = (2.0 + 4.0 * sqrt(1.0 - min(cosine * cosine, 1.0)) / cosine) * texel_mm;
     vec2 part = fract(at);

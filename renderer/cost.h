@@ -1,0 +1,85 @@
+/*
+ * What work costs, for the plan's predictions: measured with llvmpipe on two cores of an AMD EPYC, quiet.
+ * Another machine is faster or slower in all alike, more or less; predictions are to within a factor of
+ * two.
+ */
+#ifndef RENDERER_COST_H
+#define RENDERER_COST_H
+
+#include "renderer/plan.h"
+
+/* A program that is compiled or found in a cache, and first run. */
+#define RENDER_COST_PROGRAM_MS 5.0
+
+/* Nanoseconds each. */
+#define RENDER_COST_TRIANGLE 60.0        /* drawn once, whatever it covers               */
+#define RENDER_COST_TRIANGLE_4 250.0     /* the same, where pixels have four points      */
+#define RENDER_COST_SURFACE_PIXEL 60.0   /* cleared, drawn and resolved                  */
+#define RENDER_COST_VIEW_TEXEL 8.0       /* of a light's view, cleared and drawn         */
+#define RENDER_COST_READ_TEXEL 20.0      /* of the view, read back and put into samples  */
+#define RENDER_COST_SHADOW_PIXEL 150.0   /* lit and shaded at one point                  */
+#define RENDER_COST_COMPOSITE_PIXEL 80.0 /* covered                                      */
+#define RENDER_COST_SPLAT_EVALUATION 6.0 /* one sample at one pixel                      */
+#define RENDER_COST_MAP_TEXEL 120.0      /* of a translucent shadow map: drawn, levels made  */
+#define RENDER_COST_MAP_SAMPLE 90.0      /* one sample of a map at one point             */
+#define RENDER_COST_MAP_EVALUATION 20.0  /* one texel of a map at one pixel              */
+#define RENDER_COST_SCREEN_PIXEL 6.0     /* touched by a simple pass                     */
+
+static inline double render_cost_ms(double ns_each, double count)
+{
+    return 1e-6 * ns_each * count;
+}
+
+static inline double render_cost_pixels(const struct render_plan *plan)
+{
+    return (double)plan->width_px * plan->height_px;
+}
+
+/* Texels of all lights' views. */
+static inline double render_cost_view_texels(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->view_count; i++)
+        count += (double)plan->views[i].size_px * plan->views[i].size_px;
+    return count;
+}
+
+/* Texels of all translucent shadow maps; and pixels that gather from them, of each map its object's. */
+static inline double render_cost_map_texels(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->map_count; i++)
+        count += (double)plan->maps[i].size_px * plan->maps[i].size_px;
+    return count;
+}
+
+static inline double render_cost_map_pixels(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->map_count; i++)
+        count += plan->objects[plan->maps[i].object].pixel_count;
+    return count;
+}
+
+/* Samples that pixels sum, band by band: those within the band's reach of a pixel, on the lit half of its
+ * object, for each light. Splats reach farther than each of their samples; samples lie closer than asked.
+ */
+static inline double render_cost_splat_evaluations(const struct render_plan *plan)
+{
+    const double pi = 3.14159265358979323846, excess = 2.5;
+    double count = 0;
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const struct render_plan_object *const object = &plan->objects[i];
+        const struct render_plan_medium *const medium = &plan->of_medium[object->medium];
+        const double lit_mm2 = 0.5 * plan->media->area_mm2[i];
+        for (int b = 0; b < medium->band_count; b++) {
+            const struct render_band *const band = &medium->bands[b];
+            const double reached_mm2 = pi * band->r_outer_mm * band->r_outer_mm;
+            const double area_mm2 = reached_mm2 < lit_mm2 ? reached_mm2 : lit_mm2;
+            count += object->pixel_count * area_mm2 / (band->spacing_mm * band->spacing_mm);
+        }
+    }
+    return excess * (double)plan->lit_count * count;
+}
+
+#endif

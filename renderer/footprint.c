@@ -1,0 +1,162 @@
+#include "renderer/footprint.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define PI 3.14159265358979323846
+
+enum {
+    STEPS = 8,   /* nodes and rings to a standard deviation: both sums then err by less than 1e-5 */
+    REACH = 32,  /* of the table, in standard deviations; beyond, the blur changes nothing        */
+    KERNEL = 10, /* of the kernel: six standard deviations of its widest Gaussian                 */
+    GAUSSIANS = 3,
+    SPECTRUM_STEPS = 6 /* to a factor of two in frequency      */
+};
+
+static const double gaussian_weights[GAUSSIANS] = { 3, -3, 1 }; /* of variances 1, 2, 3 */
+
+/* x: frequency times blur. */
+static double kernel_spectrum(double x)
+{
+    const double e = exp(-0.5 * x * x);
+    return e * (3 + e * (-3 + e));
+}
+
+double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, double blur_mm)
+{
+    const double k_per_mm = 2 * PI / spacing_mm;
+    return 4 * kernel_spectrum(k_per_mm * blur_mm) *
+           dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, k_per_mm) /
+           dipole_stack_total(stack, DIPOLE_FACE_LIT);
+}
+
+double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double epsilon)
+{
+    const double aliasing = render_footprint_aliasing(stack, spacing_mm, 0);
+    if (!(aliasing > epsilon))
+        return 0;
+    const double part = cbrt(1 - epsilon / aliasing); /* 1 - e^(-x^2/2) */
+    return spacing_mm / (2 * PI) * sqrt(-2 * log1p(-part));
+}
+
+/*
+ * The response to an edge at 0 is 1/2 + (1/pi) int spectrum(k) sin(kx)/k dk, and so differs by at most
+ * (1/pi) int spectrum(k) (1 - blur(k))/k dk: the trapezoidal rule in log k, over which the integrand rises
+ * as k^6 and falls with the spectrum.
+ */
+double render_footprint_error(const dipole_stack *stack, double blur_mm)
+{
+    const double step = log(2) / SPECTRUM_STEPS;
+    double sum = 0;
+    for (int i = -4 * SPECTRUM_STEPS; i <= 20 * SPECTRUM_STEPS; i++) {
+        const double x = exp(i * step);
+        const double lost = -expm1(-0.5 * x * x);
+        const double term = lost * lost * lost * dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, x / blur_mm);
+        sum += term;
+        if (i > 0 && term < 1e-6 * sum)
+            break;
+    }
+    return sum * step / PI / dipole_stack_total(stack, DIPOLE_FACE_LIT);
+}
+
+double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm)
+{
+    double high_mm = least_mm;
+    for (int i = 0; i < 40; i++) {
+        const double blur_mm = render_footprint_blur_mm(stack, 2 * high_mm, epsilon);
+        if (blur_mm > 0 && render_footprint_error(stack, blur_mm) > epsilon)
+            break;
+        high_mm *= 2;
+    }
+    double low_mm = high_mm;
+    high_mm *= 2;
+    while (high_mm > 1.02 * low_mm) {
+        const double middle_mm = sqrt(low_mm * high_mm);
+        const double blur_mm = render_footprint_blur_mm(stack, middle_mm, epsilon);
+        if (blur_mm > 0 && render_footprint_error(stack, blur_mm) > epsilon)
+            high_mm = middle_mm;
+        else
+            low_mm = middle_mm;
+    }
+    return low_mm;
+}
+
+/* I_0(x) exp(-x), x >= 0: Abramowitz and Stegun 9.8.1 and 9.8.2, off by less than 2e-7. */
+static double scaled_bessel_i0(double x)
+{
+    if (x < 3.75) {
+        const double t = x / 3.75, t2 = t * t;
+        const double sum =
+            1 + t2 * (3.5156229 +
+                      t2 * (3.0899424 +
+                            t2 * (1.2067492 + t2 * (0.2659732 + t2 * (0.0360768 + t2 * 0.0045813)))));
+        return sum * exp(-x);
+    }
+    const double u = 3.75 / x;
+    const double sum =
+        0.39894228 +
+        u * (0.01328592 +
+             u * (0.00225319 +
+                  u * (-0.00157565 +
+                       u * (0.00916281 +
+                            u * (-0.02057706 + u * (0.02635537 + u * (-0.01647633 + u * 0.00392377)))))));
+    return sum / sqrt(x);
+}
+
+/* Mean of the kernel of blur 1 over a ring of radius s about a point at r. */
+static double kernel_over_ring(double r, double s)
+{
+    double sum = 0;
+    for (int i = 0; i < GAUSSIANS; i++) {
+        const double variance = i + 1;
+        sum += gaussian_weights[i] * exp(-0.5 * (r - s) * (r - s) / variance) *
+               scaled_bessel_i0(r * s / variance) / (2 * PI * variance);
+    }
+    return sum;
+}
+
+bool render_footprint_create(const dipole_stack *stack, double blur_mm,
+                             struct render_footprint **footprint_out, dipole_status *status)
+{
+    const int count = REACH * STEPS + 2, ring_count = (REACH + KERNEL) * STEPS + 1;
+    struct render_footprint *const footprint =
+        malloc(sizeof *footprint + (size_t)count * sizeof *footprint->values_per_mm2);
+    double *const power = malloc((size_t)ring_count * sizeof *power);
+    *footprint_out = NULL;
+    if (!footprint || !power) {
+        free(footprint);
+        free(power);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a profile of %d nodes",
+                           count);
+    }
+    const double step_mm = blur_mm / STEPS;
+    double within = 0;
+    for (int i = 0; i < ring_count; i++) { /* the rings about i steps; the first is a disc */
+        const double next = dipole_stack_within(stack, DIPOLE_FACE_LIT, (i + 0.5) * step_mm);
+        power[i] = fmax(next - within, 0);
+        within = next;
+    }
+    *footprint =
+        (struct render_footprint){ .step_mm = step_mm, .reach_mm = (count - 2) * step_mm, .count = count };
+    for (int node = 0; node < count; node++) {
+        const int first = node > KERNEL * STEPS ? node - KERNEL * STEPS : 0;
+        const int last = node + KERNEL * STEPS < ring_count ? node + KERNEL * STEPS : ring_count - 1;
+        double sum = 0;
+        for (int i = first; i <= last; i++)
+            sum += power[i] * kernel_over_ring((double)node / STEPS, (double)i / STEPS);
+        footprint->values_per_mm2[node] = sum / (blur_mm * blur_mm);
+    }
+    free(power);
+    *footprint_out = footprint;
+    return true;
+}
+
+/* A cubic through four nodes; even about 0. */
+double render_footprint_sample(const struct render_footprint *footprint, double r_mm)
+{
+    const double index = r_mm / footprint->step_mm;
+    const int i = (int)fmin(index, footprint->count - 3), before = i > 0 ? i - 1 : 1;
+    const double t = index - i, *const v = footprint->values_per_mm2;
+    return -t * (t - 1) * (t - 2) / 6 * v[before] + (t + 1) * (t - 1) * (t - 2) / 2 * v[i] -
+           (t + 1) * t * (t - 2) / 2 * v[i + 1] + (t + 1) * t * (t - 1) / 6 * v[i + 2];
+}

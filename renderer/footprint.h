@@ -1,0 +1,37 @@
+/*
+ * The profile averaged over the patch that a light sample stands for, so that samples farther apart than
+ * the profile is wide do not show as dots. The average is by 3 G(b) - 3 G(b sqrt 2) + G(b sqrt 3), G(b) a
+ * Gaussian of standard deviation b = blur_mm: its spectrum 1 - (1 - e^(-(bk)^2/2))^3 leaves coarse features
+ * alone and ends as fast as a Gaussian's. theory.md T34.
+ */
+#ifndef RENDERER_FOOTPRINT_H
+#define RENDERER_FOOTPRINT_H
+
+#include "libdipole/dipole.h"
+
+/* Aliasing of samples spacing_mm apart once the profile is blurred: at most, as part of the total. */
+double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, double blur_mm);
+
+/* The blur that keeps aliasing at epsilon; 0 where it is less without. */
+double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double epsilon);
+
+/* What the blur changes at the edge of a shadow on a flat surface, at most, as part of the lit radiosity.
+ */
+double render_footprint_error(const dipole_stack *stack, double blur_mm);
+
+/* The spacing at which aliasing and error of the blur are epsilon each; not less than least_mm. */
+double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm);
+
+/* Blurred profile of the lit face, tabulated out to reach_mm. One allocation; end it with free. */
+struct render_footprint {
+    double step_mm, reach_mm;
+    int count;
+    double values_per_mm2[];
+};
+DIPOLE_CHECKED bool render_footprint_create(const dipole_stack *stack, double blur_mm,
+                                            struct render_footprint **footprint_out, dipole_status *status);
+
+/* 0 <= r_mm <= reach_mm */
+double render_footprint_sample(const struct render_footprint *footprint, double r_mm);
+
+#endif

@@ -1,0 +1,121 @@
+#include "renderer/media.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool medium_init(struct render_medium *medium, const struct io_material *material,
+                        dipole_status *status)
+{
+    *medium = (struct render_medium){ .material = material,
+                                      .hash = lut_material_hash(material),
+                                      .eta = material->layers[0][0].medium.eta };
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!dipole_stack_create(material->layers[c], material->layer_count, material->model,
+                                 DIPOLE_FROM_ABOVE, &medium->stacks[c], status))
+            return false;
+        medium->diffuse_reflectance[c] = dipole_stack_total(medium->stacks[c], DIPOLE_FACE_LIT);
+        medium->has_scattering |= medium->diffuse_reflectance[c] > 0;
+    }
+    return true;
+}
+
+static double surface_area_mm2(const struct io_mesh *mesh)
+{
+    double sum = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        const uint32_t *const corners = &mesh->indices[3 * t];
+        double sides[2][3], normal[3], square = 0;
+        for (int side = 0; side < 2; side++) {
+            for (size_t k = 0; k < 3; k++)
+                sides[side][k] = (double)mesh->positions[3 * (size_t)corners[side + 1] + k] -
+                                 (double)mesh->positions[3 * (size_t)corners[0] + k];
+        }
+        for (int k = 0; k < 3; k++) {
+            normal[k] = sides[0][(k + 1) % 3] * sides[1][(k + 2) % 3] -
+                        sides[0][(k + 2) % 3] * sides[1][(k + 1) % 3];
+            square += normal[k] * normal[k];
+        }
+        sum += 0.5 * sqrt(square);
+    }
+    return sum;
+}
+
+/* Index of the medium of that hash; count when there is none yet. */
+static size_t find(const struct render_media *media, const struct lut_hash *hash)
+{
+    for (size_t i = 0; i < media->count; i++) {
+        if (strcmp(media->media[i].hash.text, hash->text) == 0)
+            return i;
+    }
+    return media->count;
+}
+
+bool render_media_create(const struct io_scene *scene, struct render_media **media_out,
+                         dipole_status *status)
+{
+    *media_out = NULL;
+    struct render_media *const media = calloc(1, sizeof *media);
+    if (media) {
+        media->media = calloc(scene->object_count, sizeof *media->media);
+        media->object_count = scene->object_count;
+        media->area_mm2 = calloc(scene->object_count, sizeof *media->area_mm2);
+        media->of_object = calloc(scene->object_count, sizeof *media->of_object);
+    }
+    bool done = media && media->media && media->of_object && media->area_mm2;
+    if (!done)
+        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the media of %zu objects",
+                    scene->object_count);
+    for (size_t i = 0; done && i < scene->object_count; i++) {
+        const struct io_material *const material = &scene->objects[i].material;
+        media->area_mm2[i] = surface_area_mm2(scene->objects[i].mesh);
+        const struct lut_hash hash = lut_material_hash(material);
+        media->of_object[i] = find(media, &hash);
+        if (media->of_object[i] < media->count)
+            continue;
+        struct render_medium *const medium = &media->media[media->count++]; /* counted first: it is ours */
+        done = medium_init(medium, material, status);
+        media->has_scattering |= medium->has_scattering;
+    }
+    if (done)
+        *media_out = media;
+    else
+        render_media_destroy(media);
+    return done;
+}
+
+void render_media_destroy(struct render_media *media)
+{
+    if (!media)
+        return;
+    for (size_t i = 0; i < media->count; i++) {
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            dipole_stack_destroy(media->media[i].stacks[c]);
+    }
+    free(media->media);
+    free(media->of_object);
+    free(media->area_mm2);
+    free(media);
+}
+
+double render_medium_r_max_mm(const struct render_medium *medium, double epsilon)
+{
+    double farthest_mm = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (medium->diffuse_reflectance[c] > 0)
+            farthest_mm =
+                fmax(farthest_mm, dipole_stack_r_max_mm(medium->stacks[c], DIPOLE_FACE_LIT, epsilon));
+    }
+    return farthest_mm;
+}
+
+double render_medium_spacing_mm(const struct render_medium *medium, double epsilon)
+{
+    double narrowest_mm = INFINITY;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (medium->diffuse_reflectance[c] > 0)
+            narrowest_mm = fmin(narrowest_mm,
+                                dipole_stack_splat_spacing_mm(medium->stacks[c], DIPOLE_FACE_LIT, epsilon));
+    }
+    return narrowest_mm;
+}

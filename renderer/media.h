@@ -1,0 +1,46 @@
+/* The media of a scene's objects, each different one once, with what every technique asks of them. */
+#ifndef RENDERER_MEDIA_H
+#define RENDERER_MEDIA_H
+
+#include "io/scene_file.h"
+#include "lutgen/lut.h"
+
+/* One medium, of any model, homogeneous or layered. Light enters and leaves by its uppermost layer. */
+struct render_medium {
+    const struct io_material *material; /* of the first object that is made of it            */
+    struct lut_hash hash;               /* lut_material_hash                                 */
+    double eta;                         /* of the uppermost layer, alike in all channels     */
+    dipole_stack *stacks[IO_CHANNEL_COUNT];
+    double diffuse_reflectance[IO_CHANNEL_COUNT]; /* 0 where the channel scatters nothing    */
+    bool has_scattering;                          /* in some channel                         */
+};
+
+/* End it with render_media_destroy; the scene must outlive it. Immutable: any number of threads may read
+ * it. */
+struct render_media {
+    struct render_medium *media;
+    size_t count;
+    size_t object_count;
+    double *area_mm2;    /* of each object's surface                                      */
+    size_t *of_object;   /* index into media, for each object of the scene */
+    bool has_scattering; /* some medium has */
+};
+
+/* A medium's profile on disk or in memory: a row of a splat table. */
+struct render_table {
+    const struct lut_splat *lut;
+    size_t row;
+};
+
+/* Fails with DIPOLE_OUT_OF_MEMORY or as dipole_stack_create does. */
+DIPOLE_CHECKED bool render_media_create(const struct io_scene *scene, struct render_media **media_out,
+                                        dipole_status *status);
+void render_media_destroy(struct render_media *media);
+
+/* How far all but epsilon of what leaves a medium travels, the farthest channel; and how far apart light
+ * samples alias by at most epsilon, the narrowest. 0 and INFINITY where nothing scatters. theory.md T9,
+ * T11. */
+double render_medium_r_max_mm(const struct render_medium *medium, double epsilon);
+double render_medium_spacing_mm(const struct render_medium *medium, double epsilon);
+
+#endif

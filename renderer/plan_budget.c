@@ -1,0 +1,305 @@
+/* How epsilon is shared out, and how far and how finely each medium is summed for it. */
+#include "renderer/footprint.h"
+#include "renderer/plan_internal.h"
+
+#include <math.h>
+
+/*
+ * How epsilon is shared out. Little may be cut off beyond r_max, of the sum and so of the table: where an
+ * object is lit from behind, light from afar is all there is. A tenth of epsilon made a back-lit bunny 5 %
+ * too dark in places; another band costs little. A third is left for what has no bound of its own, the
+ * texels of the lights' views and bands on curved surfaces.
+ */
+#define TRUNCATION_SHARE 0.02
+#define ALIASING_SHARE 0.58
+#define BANDING_SHARE 0.02
+#define TABLE_SHARE 0.02
+
+/* A profile too narrow to be sampled within ALIASING_SHARE is blurred, and half of it each is spent on
+ * aliasing and blur, if samples may then be so many times farther apart. */
+#define BLUR_GAIN 2
+
+/* Rings of so many spacings keep the bands' error under their share of epsilon = 0.01; for a tenth of that,
+ * so many more are needed (bands.h). */
+#define RING_SPACINGS 6
+#define RING_SPACINGS_PER_DECADE 2.3
+#define RING_EPSILON 0.01
+
+/* A sampled shape is followed by at least so many samples, however far the light scatters. */
+#define SAMPLES_ACROSS 32
+
+/* Largest over the channels that scatter. */
+static double worst(const struct render_medium *medium,
+                    double (*quantity)(const dipole_stack *stack, double a, double b), double a, double b)
+{
+    double largest = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (medium->diffuse_reflectance[c] > 0)
+            largest = fmax(largest, quantity(medium->stacks[c], a, b));
+    }
+    return largest;
+}
+
+static double tail(const dipole_stack *stack, double r_mm, double unused)
+{
+    (void)unused;
+    return dipole_stack_beyond(stack, DIPOLE_FACE_LIT, r_mm) / dipole_stack_total(stack, DIPOLE_FACE_LIT);
+}
+
+/* The narrowest channel's. */
+static double blurred_spacing_mm(const struct render_medium *medium, double epsilon, double least_mm)
+{
+    double narrowest_mm = INFINITY;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (medium->diffuse_reflectance[c] > 0)
+            narrowest_mm =
+                fmin(narrowest_mm, render_footprint_spacing_mm(medium->stacks[c], epsilon, least_mm));
+    }
+    return narrowest_mm;
+}
+
+/* Spacing by aliasing alone, or wider with a blur. */
+static double sampled_spacing_mm(const struct render_plan *plan, const struct render_medium *medium,
+                                 double widest_mm)
+{
+    const double sharp_mm = render_medium_spacing_mm(medium, plan->aliasing_epsilon);
+    if (sharp_mm >= widest_mm)
+        return widest_mm;
+    const double blurred_mm = blurred_spacing_mm(medium, 0.5 * plan->aliasing_epsilon, sharp_mm);
+    return fmin(blurred_mm > BLUR_GAIN * sharp_mm ? blurred_mm : sharp_mm, widest_mm);
+}
+
+static void spend_on_medium(const struct render_request *request, struct render_plan *plan, size_t index)
+{
+    const struct render_medium *const medium = &plan->media->media[index];
+    struct render_plan_medium *const planned = &plan->of_medium[index];
+    if (!planned->is_visible || !medium->has_scattering)
+        return;
+    planned->r_max_mm = render_medium_r_max_mm(medium, plan->truncation_epsilon);
+    planned->table_error = plan->table_epsilon;
+    if (request->tables) {
+        const struct lut_splat_row *const row =
+            &request->tables[index].lut->rows[request->tables[index].row];
+        planned->r_max_mm = fmin(planned->r_max_mm, row->axis.r_max_mm);
+        planned->table_error = row->error.max;
+    }
+    if (planned->r_max_mm >= planned->diameter_mm)
+        planned->r_max_mm =
+            planned->diameter_mm; /* every pair of points is near enough: nothing is cut off */
+    else
+        planned->truncation_error = worst(medium, tail, planned->r_max_mm, 0);
+    const double widest_mm = planned->diameter_mm / SAMPLES_ACROSS;
+    planned->wanted_mm =
+        request->spacing_mm > 0 ? request->spacing_mm : sampled_spacing_mm(plan, medium, widest_mm);
+    planned->spacing_mm = planned->wanted_mm;
+    plan->r_max_mm = fmax(plan->r_max_mm, planned->r_max_mm);
+    plan->spacing_mm = fmin(plan->spacing_mm, planned->spacing_mm);
+}
+
+static void space_objects(const struct render_request *request, struct render_plan *plan)
+{
+    for (size_t i = 0; i < request->scene->object_count; i++) {
+        struct render_plan_object *const object = &plan->objects[i];
+        const double spacing_mm = plan->of_medium[object->medium].spacing_mm;
+        if (!object->is_visible)
+            continue;
+        object->spacing_mm = request->spacing_mm > 0
+                                 ? spacing_mm
+                                 : fmin(spacing_mm, 2 * object->ball.radius_mm / SAMPLES_ACROSS);
+        plan->spacing_mm = fmin(plan->spacing_mm, object->spacing_mm > 0 ? object->spacing_mm : INFINITY);
+    }
+}
+
+/* Normal of a triangle, as long as its area; its first corner. */
+static void area_vector(const struct io_mesh *mesh, size_t triangle, double corner_mm[3],
+                        double area_mm2[3])
+{
+    double sides[2][3];
+    const float *const first = &mesh->positions[3 * (size_t)mesh->indices[3 * triangle]];
+    for (int k = 0; k < 3; k++)
+        corner_mm[k] = (double)first[k];
+    for (size_t i = 0; i < 2; i++) {
+        const float *const other = &mesh->positions[3 * (size_t)mesh->indices[3 * triangle + 1 + i]];
+        for (int k = 0; k < 3; k++)
+            sides[i][k] = (double)other[k] - corner_mm[k];
+    }
+    for (int k = 0; k < 3; k++)
+        area_mm2[k] = 0.5 * (sides[0][(k + 1) % 3] * sides[1][(k + 2) % 3] -
+                             sides[0][(k + 2) % 3] * sides[1][(k + 1) % 3]);
+}
+
+/* Of the mesh, whatever may be in the way. */
+static double facing_area_mm2(const struct io_mesh *mesh, const struct io_light *light)
+{
+    double sum_mm2 = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        double corner_mm[3], area_mm2[3], to_light[3];
+        area_vector(mesh, t, corner_mm, area_mm2);
+        for (int k = 0; k < 3; k++)
+            to_light[k] =
+                light->kind == IO_LIGHT_POINT ? light->position_mm[k] - corner_mm[k] : -light->direction[k];
+        if (render_dot(area_mm2, to_light) > 0)
+            sum_mm2 += sqrt(render_dot(area_mm2, area_mm2));
+    }
+    return sum_mm2;
+}
+
+static double lit_area_mm2(const struct io_scene *scene, const struct io_mesh *mesh)
+{
+    double sum_mm2 = 0;
+    for (size_t i = 0; i < scene->light_count; i++) {
+        if (render_light_shines(&scene->lights[i]))
+            sum_mm2 += facing_area_mm2(mesh, &scene->lights[i]);
+    }
+    return sum_mm2;
+}
+
+/* How many light samples there would be, about, if they were least_mm apart at least. */
+static double expected_samples(const struct render_request *request, const struct render_plan *plan,
+                               double least_mm)
+{
+    double count = 0;
+    for (size_t i = 0; i < request->scene->object_count; i++) {
+        const struct render_plan_object *const object = &plan->objects[i];
+        const double spacing_mm = fmax(object->spacing_mm, least_mm);
+        if (object->spacing_mm > 0)
+            count += object->lit_area_mm2 / spacing_mm / spacing_mm;
+    }
+    return count;
+}
+
+/* Set samples so far apart that there are not too many of them. The views' texels limit them as well, but
+ * the bands are laid out for what is asked here: the coarsest must leave few samples of a whole scene. */
+static void limit_samples(const struct render_request *request, struct render_plan *plan)
+{
+    const double limit = (double)RENDER_LIGHT_SAMPLE_LIMIT;
+    double least_mm = plan->spacing_mm;
+    for (size_t i = 0; i < request->scene->object_count;
+         i++) /* no more than this: as if all faced each light */
+        plan->objects[i].lit_area_mm2 = plan->media->area_mm2[i] * (double)plan->lit_count;
+    if (expected_samples(request, plan, least_mm) <= limit)
+        return;
+    for (size_t i = 0; i < request->scene->object_count; i++)
+        plan->objects[i].lit_area_mm2 = lit_area_mm2(request->scene, request->scene->objects[i].mesh);
+    while (expected_samples(request, plan, least_mm) > limit)
+        least_mm *= 1.05;
+    for (size_t i = 0; i < request->scene->object_count; i++) {
+        if (plan->objects[i].spacing_mm > 0)
+            plan->objects[i].spacing_mm = fmax(plan->objects[i].spacing_mm, least_mm);
+    }
+    for (size_t m = 0; m < plan->media->count; m++) {
+        if (plan->of_medium[m].spacing_mm > 0)
+            plan->of_medium[m].spacing_mm = fmax(plan->of_medium[m].spacing_mm, least_mm);
+    }
+    plan->spacing_mm = least_mm;
+}
+
+void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan)
+{
+    plan->truncation_epsilon = TRUNCATION_SHARE * plan->epsilon;
+    plan->aliasing_epsilon = ALIASING_SHARE * plan->epsilon;
+    plan->banding_epsilon = BANDING_SHARE * plan->epsilon;
+    plan->table_epsilon = fmax(TABLE_SHARE * plan->epsilon, LUT_EPSILON_MIN);
+    plan->spacing_mm = INFINITY;
+    for (size_t m = 0; m < plan->media->count; m++)
+        spend_on_medium(request, plan, m);
+    space_objects(request, plan);
+    limit_samples(request, plan);
+    if (isinf(plan->spacing_mm)) /* nothing scatters */
+        plan->spacing_mm =
+            request->spacing_mm > 0 ? request->spacing_mm : 2 * plan->ball.radius_mm / SAMPLES_ACROSS;
+    const struct render_projection *const camera = &plan->camera;
+    double nearest_mm = 1;
+    if (!camera->is_orthographic) {
+        double centre_mm[3];
+        render_projection_to_view(camera, plan->ball.centre_mm, centre_mm);
+        nearest_mm = fmax(sqrt(render_dot(centre_mm, centre_mm)) - plan->ball.radius_mm, camera->near_mm);
+    }
+    plan->r_max_px = plan->r_max_mm / (plan->pixel_mm * nearest_mm);
+}
+
+/* Of each channel that would alias by more than its share. */
+static void blur_channels(const struct render_plan *plan, const struct render_medium *medium,
+                          double spacing_mm, struct render_plan_medium *planned)
+{
+    planned->aliasing_error = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const dipole_stack *const stack = medium->stacks[c];
+        if (!(medium->diffuse_reflectance[c] > 0))
+            continue;
+        planned->blur_mm[c] = render_footprint_blur_mm(stack, spacing_mm, 0.5 * plan->aliasing_epsilon);
+        planned->aliasing_error = fmax(planned->aliasing_error,
+                                       render_footprint_aliasing(stack, spacing_mm, planned->blur_mm[c]));
+        if (planned->blur_mm[c] > 0)
+            planned->blur_error =
+                fmax(planned->blur_error, render_footprint_error(stack, planned->blur_mm[c]));
+    }
+}
+
+static void settle_medium(const struct render_request *request, struct render_plan *plan, size_t index,
+                          double texel_mm)
+{
+    const struct render_medium *const medium = &plan->media->media[index];
+    struct render_plan_medium *const planned = &plan->of_medium[index];
+    const double wanted_mm = planned->wanted_mm;
+    if (!(wanted_mm > 0))
+        return;
+    const double decades = log10(RING_EPSILON / plan->epsilon);
+    const double ring_spacings = RING_SPACINGS + RING_SPACINGS_PER_DECADE * fmax(decades, 0);
+    /* What is captured is summed by others, from the finest samples alone; so are samples that are counted.
+     */
+    const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
+    const double reach_mm = planned->r_max_mm;
+    planned->band_count = render_bands_make(planned->spacing_mm, reach_mm,
+                                            is_single ? INFINITY : ring_spacings, planned->bands);
+    plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
+    if (request->is_captured)
+        return;
+    const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
+    planned->aliasing_error = worst(medium, render_footprint_aliasing, spacing_mm, 0);
+    if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))
+        blur_channels(plan, medium, spacing_mm, planned);
+    const double widest_blur_mm = fmax(fmax(planned->blur_mm[0], planned->blur_mm[1]), planned->blur_mm[2]);
+    if (spacing_mm > wanted_mm * (1 + 1e-6))
+        render_plan_add_note(
+            plan,
+            "light samples of material \"%.60s\" are %.3g mm apart, %.3g mm were asked: a "
+            "light's view is limited to %d texels a side, all to %zu; edges of shadows blur by "
+            "%.2g mm, which changes them by up to %.2g",
+            medium->material->name, spacing_mm, wanted_mm, RENDER_VIEW_SIDE_LIMIT,
+            RENDER_LIGHT_SAMPLE_LIMIT, widest_blur_mm, planned->blur_error);
+}
+
+void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan)
+{
+    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+        return;
+    const double texel_mm = render_plan_widest_spacing_mm(plan);
+    for (size_t m = 0; m < plan->media->count; m++)
+        settle_medium(request, plan, m, texel_mm);
+}
+
+void render_plan_predict_error(const struct render_request *request, struct render_plan *plan)
+{
+    if (plan->technique != RENDER_TECHNIQUE_SPLAT || request->is_captured || !plan->has_scattering)
+        return;
+    plan->banding_error = plan->band_count > 1 ? plan->banding_epsilon : 0;
+    for (size_t m = 0; m < plan->media->count; m++) {
+        const struct render_plan_medium *const planned = &plan->of_medium[m];
+        plan->truncation_error = fmax(plan->truncation_error, planned->truncation_error);
+        plan->aliasing_error = fmax(plan->aliasing_error, planned->aliasing_error);
+        plan->blur_error = fmax(plan->blur_error, planned->blur_error);
+        plan->table_error = fmax(plan->table_error, planned->table_error);
+        if (request->tables && planned->table_error + planned->truncation_error + planned->aliasing_error +
+                                       planned->blur_error + plan->banding_error >
+                                   plan->epsilon)
+            render_plan_add_note(plan,
+                                 "the table of material \"%.60s\" was baked with epsilon %.3g: its part of "
+                                 "the error is %.2g; one baked with %.3g keeps %.3g",
+                                 plan->media->media[m].material->name, request->tables[m].lut->epsilon,
+                                 planned->table_error + planned->truncation_error, plan->table_epsilon,
+                                 plan->epsilon);
+    }
+    plan->error_predicted = plan->truncation_error + plan->aliasing_error + plan->blur_error +
+                            plan->banding_error + plan->table_error;
+}

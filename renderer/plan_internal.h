@@ -1,0 +1,32 @@
+/* What the files of the plan share. */
+#ifndef RENDERER_PLAN_INTERNAL_H
+#define RENDERER_PLAN_INTERNAL_H
+
+#include "renderer/plan.h"
+
+/* Texels a side of a light's view: every OpenGL 4.5 has 16384; this many of four floats take 268 MB. And of
+ * all views together: RENDER_LIGHT_SAMPLE_LIMIT texels, since each may become a sample. */
+enum { RENDER_VIEW_SIDE_LIMIT = 4096 };
+
+void render_plan_add_note(struct render_plan *plan, const char *format, ...) DIPOLE_PRINTF(2, 3);
+
+/* plan_budget.c: share out epsilon; r_max, spacing and blur of each visible medium. Then, once the views
+ * are known, their finest spacing tells what aliasing is left, and the bands can be laid out. */
+void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan);
+void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan);
+void render_plan_predict_error(const struct render_request *request, struct render_plan *plan);
+
+/* plan_views.c */
+DIPOLE_CHECKED bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,
+                                           dipole_status *status);
+
+/* plan_tsm.c: the maps of technique tsm, the pattern of each medium, and what is known of the error. Fails
+ * also for options that contradict each other, and for volumes of other media. */
+DIPOLE_CHECKED bool render_plan_make_maps(const struct render_request *request, struct render_plan *plan,
+                                          dipole_status *status);
+void render_plan_predict_map_error(const struct render_request *request, struct render_plan *plan);
+
+/* How far apart the samples of a view may be: as asked, or as the coarsest texels allow. */
+double render_plan_widest_spacing_mm(const struct render_plan *plan);
+
+#endif

@@ -1,0 +1,174 @@
+#include "renderer/reference_pixel.h"
+
+#include "renderer/plan.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* ---- rays --------------------------------------------------------------------------------------- */
+
+/* A ray from the camera's near plane through a place in the picture, in pixels from the top left. */
+static void camera_ray(const struct render_pixel_view *view, double x_px, double y_px, double origin_mm[3],
+                       double direction[3])
+{
+    const struct render_projection *const camera = &view->camera;
+    const double across = (2 * x_px / view->width_px - 1) * camera->half_width;
+    const double up = (1 - 2 * y_px / view->height_px) * camera->half_height;
+    for (int k = 0; k < 3; k++) {
+        const double aside = across * camera->right[k] + up * camera->up[k];
+        direction[k] = camera->forward[k] + (camera->is_orthographic ? 0 : aside);
+        origin_mm[k] =
+            camera->eye_mm[k] + camera->near_mm * direction[k] + (camera->is_orthographic ? aside : 0);
+    }
+}
+
+static double distance_mm(const double a_mm[3], const double b_mm[3])
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++)
+        square += (a_mm[k] - b_mm[k]) * (a_mm[k] - b_mm[k]);
+    return sqrt(square);
+}
+
+static void add_hit(const struct render_pixel_view *view, const struct render_surface_point *hit,
+                    struct render_pixel *pixel)
+{
+    int g = 0;
+    while (g < pixel->group_count &&
+           (pixel->groups[g].points[0].object != hit->object ||
+            distance_mm(hit->position_mm, pixel->groups[g].points[0].position_mm) >
+                view->media[hit->object].group_mm))
+        g++;
+    if (g == pixel->group_count)
+        pixel->groups[pixel->group_count++].count = 0;
+    struct render_pixel_group *const group = &pixel->groups[g];
+    group->points[group->count++] = *hit;
+    pixel->hit_count++;
+}
+
+void render_pixel_trace(const struct render_pixel_view *view, int x, int y, struct render_pixel *pixel)
+{
+    pixel->group_count = pixel->hit_count = 0;
+    for (int i = 0; i < RENDER_PIXEL_RAYS; i++) {
+        const int column = i % RENDER_PIXEL_SIDE, line = i / RENDER_PIXEL_SIDE;
+        const double x_px = x + (column + 0.5) / RENDER_PIXEL_SIDE;
+        const double y_px = y + (line + 0.5) / RENDER_PIXEL_SIDE;
+        double origin_mm[3], direction[3];
+        struct render_surface_point hit;
+        camera_ray(view, x_px, y_px, origin_mm, direction);
+        if (render_tracer_find(view->tracer, origin_mm, direction, &hit))
+            add_hit(view, &hit, pixel);
+    }
+}
+
+/* ---- light -------------------------------------------------------------------------------------- */
+
+static void toward_eye(const struct render_projection *camera, const double position_mm[3],
+                       double to_eye[3])
+{
+    const double away_mm = distance_mm(camera->eye_mm, position_mm);
+    for (int k = 0; k < 3; k++)
+        to_eye[k] =
+            camera->is_orthographic ? -camera->forward[k] : (camera->eye_mm[k] - position_mm[k]) / away_mm;
+}
+
+double render_pixel_exit_per_sr(const struct render_pixel_view *view,
+                                const struct render_surface_point *point)
+{
+    const struct render_pixel_medium *const medium = &view->media[point->object];
+    double to_eye[3];
+    toward_eye(&view->camera, point->position_mm, to_eye);
+    /* Interpolated normals may lean away from the eye near the silhouette: mirrored, as common/exit.glsl.
+     */
+    const double cosine = fmin(fabs(render_dot(point->normal, to_eye)), 1);
+    return (1 - dipole_fresnel_reflectance(medium->eta, cosine)) * medium->exit_scale_per_sr;
+}
+
+bool render_light_reaches(const struct render_tracer *tracer, const struct io_light *light,
+                          const struct render_surface_point *point, double to_light[3], double *falloff_out)
+{
+    double away_mm = INFINITY;
+    *falloff_out = 1;
+    for (int k = 0; k < 3; k++)
+        to_light[k] = -light->direction[k];
+    if (light->kind == IO_LIGHT_POINT) {
+        away_mm = distance_mm(light->position_mm, point->position_mm);
+        for (int k = 0; k < 3; k++)
+            to_light[k] = (light->position_mm[k] - point->position_mm[k]) / away_mm;
+        *falloff_out = 1 / (away_mm * away_mm);
+    }
+    return render_dot(point->facet_normal, to_light) > 0 &&
+           render_tracer_is_clear(tracer, point->position_mm, point->facet_normal, to_light, away_mm);
+}
+
+/* f cosine of GGX with the height-correlated Smith term; alpha: roughness. specular.frag has the same. */
+static double ggx(double alpha, double cosine_normal_half, double cosine_in, double cosine_out)
+{
+    const double a2 = alpha * alpha;
+    const double d = 1 + cosine_normal_half * cosine_normal_half * (a2 - 1);
+    const double distribution = a2 / (PI * d * d);
+    const double smith_in = cosine_out * sqrt(a2 + (1 - a2) * cosine_in * cosine_in);
+    const double smith_out = cosine_in * sqrt(a2 + (1 - a2) * cosine_out * cosine_out);
+    return distribution * 0.5 * cosine_in / (smith_in + smith_out);
+}
+
+/* Mirrored part of the irradiance of a light, in 1/sr. */
+static double mirrored_per_sr(const struct render_pixel_view *view,
+                              const struct render_surface_point *point, const double to_light[3])
+{
+    double to_eye[3], middle[3];
+    toward_eye(&view->camera, point->position_mm, to_eye);
+    const double cosine_in = render_dot(point->normal, to_light);
+    const double cosine_out = render_dot(point->normal, to_eye);
+    if (cosine_in <= 0 || cosine_out <= 0)
+        return 0;
+    for (int k = 0; k < 3; k++)
+        middle[k] = to_light[k] + to_eye[k];
+    const double length = sqrt(render_dot(middle, middle));
+    const double cosine_half = fmin(fmax(render_dot(to_light, middle) / length, 0), 1);
+    return dipole_fresnel_reflectance(view->media[point->object].eta, cosine_half) *
+           ggx(view->scene->objects[point->object].roughness, render_dot(point->normal, middle) / length,
+               cosine_in, cosine_out);
+}
+
+void render_pixel_add_specular(const struct render_pixel_view *view,
+                               const struct render_surface_point *point, double radiance[3])
+{
+    if (!view->scene->objects[point->object].has_specular)
+        return;
+    for (size_t i = 0; i < view->scene->light_count; i++) {
+        const struct io_light *const light = &view->scene->lights[i];
+        double to_light[3], falloff;
+        if (!render_light_shines(light) ||
+            !render_light_reaches(view->tracer, light, point, to_light, &falloff))
+            continue;
+        const double mirrored = falloff * mirrored_per_sr(view, point, to_light);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            radiance[c] += light->rgb[c] * mirrored;
+    }
+}
+
+/* ---- for a screen ------------------------------------------------------------------------------- */
+
+/* tone_map.frag has the same. */
+void render_tone_map(const struct io_scene *scene, float rgba[4])
+{
+    const double knee = 0.6, exposure = exp2(scene->exposure_ev);
+    double colour[3], largest = 0;
+    for (int c = 0; c < 3; c++) {
+        const double over = (double)rgba[c] + (1 - (double)rgba[3]) * scene->background[c];
+        colour[c] = fmax(exposure * over, 0);
+        largest = fmax(largest, colour[c]);
+    }
+    for (int c = 0; c < 3 && largest > knee; c++) {
+        const double bent = 1 - (1 - knee) * exp(-(largest - knee) / (1 - knee));
+        const double fade = 1 - 1 / (1 + 0.15 * (largest - bent));
+        const double scaled = colour[c] * (bent / largest);
+        colour[c] = scaled + fade * (bent - scaled);
+    }
+    for (int c = 0; c < 3; c++)
+        rgba[c] = (float)colour[c];
+    rgba[3] = 1;
+}

@@ -1,0 +1,24 @@
+/* Rays through a scene's triangles, by Embree; nothing else of the project knows it. */
+#ifndef RENDERER_REFERENCE_TRACE_H
+#define RENDERER_REFERENCE_TRACE_H
+
+#include "renderer/reference_surface.h"
+
+struct render_tracer;
+
+/* Fails with DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED. The scene must outlive the tracer. */
+DIPOLE_CHECKED bool render_tracer_create(const struct io_scene *scene, struct render_tracer **tracer_out,
+                                         dipole_status *status);
+void render_tracer_destroy(struct render_tracer *tracer);
+
+/* The first surface from origin_mm along direction (any length > 0); false when there is none. For any
+ * number of threads at once. */
+bool render_tracer_find(const struct render_tracer *tracer, const double origin_mm[3],
+                        const double direction[3], struct render_surface_point *hit);
+
+/* Whether nothing is in the way from a point of a triangle, on the side of its facet normal, along the unit
+ * vector direction, until distance_mm (INFINITY: to the end). For any number of threads at once. */
+bool render_tracer_is_clear(const struct render_tracer *tracer, const double position_mm[3],
+                            const double facet_normal[3], const double direction[3], double distance_mm);
+
+#endif

@@ -1,0 +1,2 @@
+// Pass tsm_texels: over the whole target.
+#include "fullscreen.vert"

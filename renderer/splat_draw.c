@@ -1,0 +1,356 @@
+#include "renderer/splat_draw.h"
+
+#include "renderer/splats.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { UNIT_SAMPLES = 14, UNIT_TABLE = 15 };
+
+/* Samples of one medium, of each band. */
+struct medium_samples {
+    struct render_light_samples bands[RENDER_BAND_LIMIT];
+};
+
+/* What a table of bands was made for. */
+struct table_key {
+    const struct lut_splat *table;
+    size_t row;
+    double blur_mm[IO_CHANNEL_COUNT];
+    int band_count;
+    struct render_band bands[RENDER_BAND_LIMIT];
+};
+
+struct render_splatter {
+    size_t medium_count;
+    struct medium_samples *of_medium;
+    struct table_key *keys; /* of what table_buffer holds, medium by medium */
+    size_t splat_count, dropped_count;
+    GLuint vertex_array, splat_buffer;
+    struct render_buffer_texture sample_buffer, table_buffer;
+};
+
+static void vertex_array_create(struct render_splatter *splatter)
+{
+    glCreateVertexArrays(1, &splatter->vertex_array);
+    const GLuint array = splatter->vertex_array;
+    glVertexArrayAttribFormat(array, 0, 4, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, rectangle));
+    glVertexArrayAttribFormat(array, 1, 1, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, depth));
+    glVertexArrayAttribIFormat(array, 2, 2, GL_UNSIGNED_INT, offsetof(struct render_splat, first));
+    glVertexArrayAttribFormat(array, 3, 1, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, object));
+    glVertexArrayAttribFormat(array, 4, 4, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, centre_mm));
+    glVertexArrayAttribFormat(array, 5, 4, GL_FLOAT, GL_FALSE, offsetof(struct render_splat, profile));
+    glVertexArrayBindingDivisor(array, 0, 1);
+    for (GLuint i = 0; i < 6; i++) {
+        glVertexArrayAttribBinding(array, i, 0);
+        glEnableVertexArrayAttrib(array, i);
+    }
+}
+
+bool render_splatter_create(const struct render_media *media, struct render_splatter **splatter_out,
+                            dipole_status *status)
+{
+    *splatter_out = NULL;
+    struct render_splatter *const splatter = calloc(1, sizeof *splatter);
+    if (splatter) {
+        splatter->medium_count = media->count;
+        splatter->of_medium = calloc(media->count, sizeof *splatter->of_medium);
+        splatter->keys = calloc(media->count, sizeof *splatter->keys);
+    }
+    if (!splatter || !splatter->of_medium || !splatter->keys) {
+        render_splatter_destroy(splatter);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the samples of %zu media",
+                           media->count);
+    }
+    vertex_array_create(splatter);
+    *splatter_out = splatter;
+    return true;
+}
+
+void render_splatter_destroy(struct render_splatter *splatter)
+{
+    if (!splatter)
+        return;
+    for (size_t m = 0; splatter->of_medium && m < splatter->medium_count; m++) {
+        for (int b = 0; b < RENDER_BAND_LIMIT; b++)
+            render_light_samples_destroy(&splatter->of_medium[m].bands[b]);
+    }
+    if (splatter->vertex_array)
+        glDeleteVertexArrays(1, &splatter->vertex_array);
+    if (splatter->splat_buffer)
+        glDeleteBuffers(1, &splatter->splat_buffer);
+    render_buffer_texture_destroy(&splatter->sample_buffer);
+    render_buffer_texture_destroy(&splatter->table_buffer);
+    free(splatter->of_medium);
+    free(splatter->keys);
+    free(splatter);
+}
+
+static void empty_samples(struct render_splatter *splatter)
+{
+    for (size_t m = 0; m < splatter->medium_count; m++) {
+        for (int b = 0; b < RENDER_BAND_LIMIT; b++)
+            splatter->of_medium[m].bands[b].count = 0;
+    }
+}
+
+void render_splatter_begin(struct render_splatter *splatter)
+{
+    splatter->splat_count = splatter->dropped_count = 0;
+    empty_samples(splatter);
+}
+
+void render_splatter_drop_samples(struct render_splatter *splatter)
+{
+    splatter->dropped_count = render_splatter_sample_count(splatter);
+    empty_samples(splatter);
+}
+
+/* ---- samples ------------------------------------------------------------------------------------ */
+
+/* Read a texture of the light's view back; NULL: no memory. */
+static float *read_view(const struct render_frame *frame, const char *texture, GLenum format,
+                        size_t components)
+{
+    const GLsizei size_px = frame->view->size_px;
+    const size_t size = (size_t)size_px * (size_t)size_px * components * sizeof(float);
+    float *const texels = malloc(size);
+    if (texels)
+        glGetTextureSubImage(render_executor_texture(frame->executor, texture), 0, 0, 0, 0, size_px,
+                             size_px, 1, format, GL_FLOAT, (GLsizei)size, texels);
+    return texels;
+}
+
+bool render_splatter_sample_view(struct render_splatter *splatter, const struct render_frame *frame,
+                                 dipole_status *status)
+{
+    const struct render_plan *const plan = frame->plan;
+    const struct render_plan_view *const view = frame->view;
+    const size_t object_count = frame->request->scene->object_count;
+    struct render_light_target *const targets = calloc(object_count, sizeof *targets);
+    float *const texels = read_view(frame, "light_view", GL_RGBA, 4);
+    float *const objects = plan->has_object_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
+    const bool is_counted = plan->area == RENDER_AREA_OVERLAP;
+    float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
+    bool done = targets && texels && (objects || !plan->has_object_ids) && (irradiance || !is_counted);
+    if (done) {
+        struct render_light_view reduced = { .texels = texels,
+                                             .objects = objects,
+                                             .irradiance = irradiance,
+                                             .size_px = view->size_px,
+                                             .levels = view->levels };
+        memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
+        memcpy(reduced.rgb, frame->request->scene->lights[view->light].rgb, sizeof reduced.rgb);
+        for (size_t i = 0; i < object_count; i++) {
+            const struct render_plan_object *const object = &plan->objects[i];
+            if (object->spacing_mm > 0)
+                targets[i] = (struct render_light_target){ &splatter->of_medium[object->medium].bands[0],
+                                                           object->spacing_mm };
+        }
+        /* Without ids all are alike, but some may be out of sight. */
+        for (size_t i = 1; !objects && i < object_count; i++) {
+            if (targets[i].samples &&
+                (!targets[0].samples || targets[i].spacing_mm < targets[0].spacing_mm))
+                targets[0] = targets[i];
+        }
+        done = render_light_samples_append(targets, &reduced, status);
+    } else {
+        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a light's view of %d texels a side",
+                    view->size_px);
+    }
+    free(targets);
+    free(texels);
+    free(objects);
+    free(irradiance);
+    return done;
+}
+
+/* ---- splats ------------------------------------------------------------------------------------- */
+
+static bool is_same_band(const struct render_band *a, const struct render_band *b)
+{
+    return a->spacing_mm == b->spacing_mm && a->r_inner_mm == b->r_inner_mm &&
+           a->r_outer_mm == b->r_outer_mm && a->rise_mm == b->rise_mm && a->fall_mm == b->fall_mm;
+}
+
+static bool is_table_of(const struct table_key *key, const struct render_table *table,
+                        const struct render_plan_medium *planned)
+{
+    bool is_same =
+        key->table == table->lut && key->row == table->row && key->band_count == planned->band_count;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        is_same = is_same && key->blur_mm[c] == planned->blur_mm[c];
+    for (int b = 0; b < planned->band_count; b++)
+        is_same = is_same && is_same_band(&key->bands[b], &planned->bands[b]);
+    return is_same;
+}
+
+/* Fill the buffer of profiles, all media one after the other, unless it holds them already. */
+static bool fill_table(struct render_splatter *splatter, const struct render_frame *frame,
+                       const struct render_table *tables, dipole_status *status)
+{
+    const struct render_plan *const plan = frame->plan;
+    bool is_known = splatter->table_buffer.texture != 0;
+    size_t node_count = 0;
+    for (size_t m = 0; m < splatter->medium_count; m++) {
+        const struct render_plan_medium *const planned = &plan->of_medium[m];
+        is_known &= is_table_of(&splatter->keys[m], &tables[m], planned);
+        const struct render_band_source source = { .table = tables[m].lut, .row = tables[m].row };
+        if (planned->band_count > 0)
+            node_count += (size_t)planned->band_count * (size_t)render_bands_axis(&source).node_count;
+    }
+    if (is_known)
+        return true;
+    float *const nodes = calloc(node_count + 1, 4 * sizeof *nodes), *next = nodes;
+    if (!nodes)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for profiles of %zu nodes",
+                           node_count);
+    bool done = true;
+    for (size_t m = 0; done && m < splatter->medium_count; m++) {
+        const struct render_plan_medium *const planned = &plan->of_medium[m];
+        struct render_band_source source = { .table = tables[m].lut,
+                                             .row = tables[m].row,
+                                             .medium = &plan->media->media[m] };
+        memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
+        if (planned->band_count == 0)
+            continue;
+        done = render_bands_bake(&source, planned->bands, planned->band_count, next, status);
+        next += (size_t)planned->band_count * (size_t)render_bands_axis(&source).node_count * 4;
+    }
+    if (done)
+        render_buffer_texture_fill(&splatter->table_buffer, GL_RGBA32F, nodes,
+                                   node_count * 4 * sizeof *nodes);
+    for (size_t m = 0; done && m < splatter->medium_count; m++) {
+        const struct render_plan_medium *const planned = &plan->of_medium[m];
+        struct table_key *const key = &splatter->keys[m];
+        *key = (struct table_key){ .table = tables[m].lut,
+                                   .row = tables[m].row,
+                                   .band_count = planned->band_count };
+        memcpy(key->blur_mm, planned->blur_mm, sizeof key->blur_mm);
+        memcpy(key->bands, planned->bands, sizeof key->bands);
+    }
+    free(nodes);
+    return done;
+}
+
+/* What is drawn: samples one band after the other, and splats of them. */
+struct batch {
+    struct render_light_sample *samples;
+    size_t sample_count, sample_capacity;
+    struct render_splats splats;
+};
+
+static bool add_samples(struct batch *batch, const struct render_light_samples *samples,
+                        dipole_status *status)
+{
+    if (batch->sample_capacity - batch->sample_count < samples->count) {
+        const size_t capacity = batch->sample_count + samples->count + batch->sample_capacity / 2;
+        struct render_light_sample *const grown = realloc(batch->samples, capacity * sizeof *grown);
+        if (!grown)
+            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
+                               capacity);
+        batch->samples = grown;
+        batch->sample_capacity = capacity;
+    }
+    if (samples->count > 0)
+        memcpy(batch->samples + batch->sample_count, samples->samples,
+               samples->count * sizeof *samples->samples);
+    batch->sample_count += samples->count;
+    return true;
+}
+
+/* first_node: of the medium's first band; moved on to the next medium's. */
+static bool add_medium(struct render_splatter *splatter, const struct render_plan *plan, size_t medium,
+                       const struct render_table *table, size_t *first_node, struct batch *batch,
+                       dipole_status *status)
+{
+    const struct render_plan_medium *const planned = &plan->of_medium[medium];
+    struct render_light_samples *const samples = splatter->of_medium[medium].bands;
+    const struct render_band_source source = { .table = table->lut, .row = table->row };
+    for (int b = 0; b < planned->band_count; b++) {
+        const struct render_band *const band = &planned->bands[b];
+        const struct lut_axis axis = render_bands_axis(&source);
+        const double end = axis.r_max_mm / axis.scale_mm;
+        const struct render_splat_profile profile = {
+            .reach2_mm2 = (float)(band->r_outer_mm * band->r_outer_mm),
+            .first_node = (float)*first_node,
+            .inverse_scale2 = (float)(1 / (axis.scale_mm * axis.scale_mm)),
+            .nodes_per_log2 = (float)((axis.node_count - 1) / log2(1 + end * end)),
+        };
+        if (b > 0 && !render_light_samples_merge(&samples[b - 1], band->spacing_mm, &samples[b], status))
+            return false;
+        if (!render_splats_append(&batch->splats, &samples[b], batch->sample_count, &plan->camera,
+                                  band->r_outer_mm, &profile, status) ||
+            !add_samples(batch, &samples[b], status))
+            return false;
+        *first_node += (size_t)axis.node_count;
+    }
+    return true;
+}
+
+static bool check_size(const struct batch *batch, dipole_status *status)
+{
+    GLint texel_limit = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texel_limit);
+    return 2 * batch->sample_count <= (size_t)texel_limit ||
+           dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL,
+                       "%zu light samples, this OpenGL takes %d: a larger epsilon needs fewer",
+                       batch->sample_count, texel_limit / 2);
+}
+
+static void draw_batch(struct render_splatter *splatter, const struct render_frame *frame,
+                       const struct batch *batch)
+{
+    render_buffer_texture_fill(&splatter->sample_buffer, GL_RGBA32F, batch->samples,
+                               batch->sample_count * sizeof *batch->samples);
+    render_bind_buffer(frame, "light_samples", UNIT_SAMPLES, &splatter->sample_buffer);
+    render_bind_buffer(frame, "profile_table", UNIT_TABLE, &splatter->table_buffer);
+    render_set_int(frame->program, "profile_last_node", RENDER_BAND_NODES - 1);
+    glDeleteBuffers(1, &splatter->splat_buffer);
+    glCreateBuffers(1, &splatter->splat_buffer);
+    glNamedBufferStorage(splatter->splat_buffer,
+                         (GLsizeiptr)(batch->splats.count * sizeof *batch->splats.splats),
+                         batch->splats.splats, 0);
+    glVertexArrayVertexBuffer(splatter->vertex_array, 0, splatter->splat_buffer, 0,
+                              sizeof *batch->splats.splats);
+    glBindVertexArray(splatter->vertex_array);
+    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)batch->splats.count);
+    render_count_draw(frame);
+}
+
+bool render_splatter_draw(struct render_splatter *splatter, const struct render_frame *frame,
+                          dipole_status *status)
+{
+    const struct render_table *const tables = frame->tables;
+    struct batch batch = { 0 };
+    size_t first_node = 0;
+    bool done = fill_table(splatter, frame, tables, status);
+    for (size_t m = 0; done && m < splatter->medium_count; m++)
+        done = add_medium(splatter, frame->plan, m, &tables[m], &first_node, &batch, status);
+    done = done && check_size(&batch, status);
+    splatter->splat_count += batch.splats.count;
+    if (done && batch.splats.count > 0)
+        draw_batch(splatter, frame, &batch);
+    free(batch.samples);
+    render_splats_destroy(&batch.splats);
+    return done;
+}
+
+struct render_light_samples *render_splatter_samples(struct render_splatter *splatter, size_t medium)
+{
+    return &splatter->of_medium[medium].bands[0];
+}
+
+size_t render_splatter_sample_count(const struct render_splatter *splatter)
+{
+    size_t count = splatter->dropped_count;
+    for (size_t m = 0; m < splatter->medium_count; m++)
+        count += splatter->of_medium[m].bands[0].count;
+    return count;
+}
+
+size_t render_splatter_splat_count(const struct render_splatter *splatter)
+{
+    return splatter->splat_count;
+}
