@@ -1,9 +1,13 @@
 /*
  * How far pictures are from a reference.
  * usage: bench_pictures errors REFERENCE.exr PICTURE.exr
- *            Markdown cells in %, within objects, then with their edges: relative RMSE, Weber's 99th
- * percentile, and that of values above 1e-4 of the brightest bench_pictures difference REFERENCE.exr
- * PICTURE.exr OUT.ppm signed: red is too bright, blue too dark, full colour at 5 % of the brightest
+ *
+ * Markdown cells in %, within objects, then with their edges: relative RMSE, Weber's 99th percentile, and
+ * that of values above 1e-4 of the brightest.
+ *
+ * usage: bench_pictures difference REFERENCE.exr PICTURE.exr OUT.ppm
+ *
+ * Signed: red is too bright, blue too dark, full colour at 10 % of the brightest.
  */
 #include "io/exr.h"
 
@@ -101,7 +105,7 @@ static bool write_difference(const struct io_image *reference, const struct io_i
         double step = 0;
         for (size_t c = 0; c < 3; c++)
             step += ((double)picture->pixels[4 * i + c] - (double)reference->pixels[4 * i + c]) / 3;
-        const double part = fmin(fmax(step / (0.05 * (double)brightest), -1), 1);
+        const double part = fmin(fmax(step / (0.1 * (double)brightest), -1), 1);
         const double red = part > 0 ? 1 : 1 + part, blue = part < 0 ? 1 : 1 - part, green = 1 - fabs(part);
         const double rgb[3] = { red, green, blue };
         for (int c = 0; c < 3; c++)
