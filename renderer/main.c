@@ -301,6 +301,37 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
     return done;
 }
 
+/* No option may be given that would do nothing. In the window every technique can be chosen. */
+static bool check_usage(const struct options *options, dipole_status *status)
+{
+    const enum render_technique technique = (enum render_technique)options->technique;
+    const bool is_splat = technique == RENDER_TECHNIQUE_AUTO || technique == RENDER_TECHNIQUE_SPLAT;
+    const bool is_reference = technique == RENDER_TECHNIQUE_REFERENCE;
+    const bool has_tsm_options = options->tsm_gather || options->tsm_response || options->tsm_part ||
+                                 options->tsm_samples || options->layer_pairs;
+    const struct {
+        bool is_wrong;
+        const char *what;
+    } rules[] = {
+        { !options->output_path && !options->is_viewed, "no --output (-o) IMG was given; try --help" },
+        { options->is_viewed && options->frames[0] >= 0, "--view cannot be used with --frames" },
+        { options->is_viewed && options->is_explained, "--view cannot be used with --explain" },
+        { options->is_viewed && options->context >= 0, "--view cannot be used with --context" },
+        { is_reference && options->is_viewed, "--technique reference cannot be used with --view" },
+        { is_reference && options->table_folder, "--technique reference cannot be used with --luts" },
+        { is_reference && options->context >= 0, "--technique reference cannot be used with --context" },
+        { options->area != RENDER_AREA_FLUX && !is_splat && !options->is_viewed,
+          "--splat-area is of --technique splat alone" },
+        { has_tsm_options && technique != RENDER_TECHNIQUE_TSM && !options->is_viewed,
+          "--tsm, --tsm-response, --tsm-part, --tsm-samples and --peel are of --technique tsm alone" },
+    };
+    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
+        if (rules[i].is_wrong)
+            return dipole_fail(status, DIPOLE_BAD_VALUE, NULL, "%s", rules[i].what);
+    }
+    return true;
+}
+
 int main(int argc, char **argv)
 {
     struct options options = { .epsilon = RENDER_EPSILON_DEFAULT, .context = -1, .frames = { -1, -1 } };
@@ -450,19 +481,8 @@ int main(int argc, char **argv)
     case CLI_RUN:
         break;
     }
-    if (!options.output_path && !options.is_viewed) {
-        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "no --output (-o) IMG was given; try --help");
+    if (!check_usage(&options, &status))
         return cli_report(&tool, &status, EXIT_USAGE);
-    }
-    if (options.is_viewed && options.frames[0] >= 0) {
-        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "--view cannot be used with --frames");
-        return cli_report(&tool, &status, EXIT_USAGE);
-    }
-    if (options.technique == RENDER_TECHNIQUE_REFERENCE && (options.is_viewed || options.table_folder)) {
-        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "--technique reference cannot be used with %s",
-                    options.is_viewed ? "--view" : "--luts");
-        return cli_report(&tool, &status, EXIT_USAGE);
-    }
     if (!run(&tool, &options, operands[0], &status))
         return cli_report(&tool, &status, EXIT_FAILED);
     return EXIT_DONE;

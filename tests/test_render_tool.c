@@ -188,6 +188,22 @@ static void wrong_usage_is_code_2(void **state)
     fails_with(RENDER " turn.json -o bad.exr --frames=-1", 2,
                "render: --frames is \"-1\", expected FIRST:LAST or one number, each 0 to 99999\n");
     fails_with(RENDER " turn.json --view --frames 0:1", 2, "render: --view cannot be used with --frames\n");
+    fails_with(RENDER " sphere.json --view --explain", 2, "render: --view cannot be used with --explain\n");
+    fails_with(RENDER " sphere.json --view --context egl", 2,
+               "render: --view cannot be used with --context\n");
+    fails_with(RENDER " sphere.json -o bad.exr -t reference --context egl", 2,
+               "render: --technique reference cannot be used with --context\n");
+    fails_with(RENDER " sphere.json -o bad.exr -t tsm --splat-area overlap", 2,
+               "render: --splat-area is of --technique splat alone\n");
+    static const char *const tsm_options[] = { "--tsm vertex", "--tsm-response exact", "--tsm-part local",
+                                               "--tsm-samples 53", "--peel 2" };
+    for (size_t i = 0; i < sizeof tsm_options / sizeof *tsm_options; i++) {
+        char command[256];
+        snprintf(command, sizeof command, RENDER " sphere.json -o bad.exr %s", tsm_options[i]);
+        fails_with(command, 2,
+                   "render: --tsm, --tsm-response, --tsm-part, --tsm-samples and --peel are of --technique "
+                   "tsm alone\n");
+    }
     char out[32768], err[32768];
     assert_int_equal(run(RENDER " sphere.json -o bad.exr --epsilon 0", out, err, sizeof out), 2);
     assert_int_equal(run(RENDER " sphere.json -o bad.exr --budget-ms 5", out, err, sizeof out), 2);
