@@ -136,6 +136,15 @@ struct lut_tsm_sample {
 /* How many, by the slices of the volume: 13, 21, 53, 117 or 245 of 16, 32, 64, 128 or 256. */
 enum { LUT_TSM_SAMPLE_LIMIT = 256, LUT_TSM_LOCAL_SIDE = 7, LUT_TSM_SIDE_MIN = 8, LUT_TSM_SIDE_MAX = 1024 };
 
+/* Slices of the volume whose pattern has so many samples; 0 when there is none. */
+int lut_tsm_slices(int sample_count);
+
+/* Width of the inner square of a volume's pattern, for a medium all but LUT_TSM_EXTENT_EPSILON of whose
+ * light leaves within r_max_mm: the last ring takes what comes from farther. A wider pattern would have
+ * coarser cells. */
+#define LUT_TSM_EXTENT_EPSILON 0.03
+double lut_tsm_inner_mm(double r_max_mm, int slices);
+
 /*
  * The response of a point to a unit of flux per mm^2 of the light's plane in the cell of a sample (T32), in
  * 1/mm^2: times the sample's area it is what leaves per mm^2. With D = x_out - x_in, N the normal where the

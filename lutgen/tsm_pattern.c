@@ -10,6 +10,8 @@
 
 #include <math.h>
 
+enum { INNER_CELLS = 5 };
+
 /* A ring of cells of which per_side stand along the side of what it encloses: 4 (per_side + 1) of them. */
 static const struct design {
     int slices, per_side, rings;
@@ -34,10 +36,23 @@ bool lut_pattern_has(int slices)
     return design_of(slices) != NULL;
 }
 
+int lut_tsm_slices(int sample_count)
+{
+    for (size_t i = 0; i < sizeof designs / sizeof *designs; i++)
+        if (INNER_CELLS + designs[i].rings * 4 * (designs[i].per_side + 1) == sample_count)
+            return designs[i].slices;
+    return 0;
+}
+
 double lut_pattern_extent(int slices)
 {
     const struct design *const design = design_of(slices);
     return pow((design->per_side + 2.0) / design->per_side, design->rings);
+}
+
+double lut_tsm_inner_mm(double r_max_mm, int slices)
+{
+    return 2 * r_max_mm / lut_pattern_extent(slices);
 }
 
 static struct lut_cell polygon(double corners[4][2], bool is_inner, bool is_outermost)
@@ -75,7 +90,7 @@ static int inner_cells(struct lut_cell *cells)
         }
         cells[1 + k] = polygon(corners, true, false);
     }
-    return 5;
+    return INNER_CELLS;
 }
 
 int lut_pattern_cells(int slices, struct lut_cell cells[LUT_TSM_SAMPLE_LIMIT])

@@ -234,10 +234,6 @@ void lut_tsm_plan_destroy(struct lut_tsm_plan *plan)
     free(plan);
 }
 
-/* The pattern reaches so far that this part of the light comes from farther, which the last ring takes: a
- * wider one would have coarser cells. */
-static const double extent_epsilon = 0.03;
-
 /* Lengths and samples follow from the material and the number of slices. */
 static void lengths_find(struct lut_tsm_plan *plan)
 {
@@ -250,7 +246,7 @@ static void lengths_find(struct lut_tsm_plan *plan)
     }
     if (r_max_mm == 0) /* nothing scatters */
         r_max_mm = shortest_mm;
-    lut->inner_mm = 2 * r_max_mm / lut_pattern_extent(lut->size[2]);
+    lut->inner_mm = lut_tsm_inner_mm(r_max_mm, lut->size[2]);
     lut->depth_max_mm = r_max_mm;
     lut->depth_scale_mm = lut->inner_mm;
     lut->local_depth_scale_mm = fmin(lut->inner_mm, shortest_mm);
@@ -287,7 +283,7 @@ bool lut_tsm_plan_create(struct lut_tsm *lut, struct lut_tsm_plan **plan_out, di
         !(plan->terms = malloc(terms * sizeof *plan->terms)))
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "out of memory for a volume");
     plan->lut = lut;
-    if (!lut_profiles_init(&lut->material, extent_epsilon, plan->profiles, status) ||
+    if (!lut_profiles_init(&lut->material, LUT_TSM_EXTENT_EPSILON, plan->profiles, status) ||
         !lut_profiles_check_range(plan->profiles, status))
         return false;
     lengths_find(plan);

@@ -45,13 +45,19 @@ static inline double render_cost_view_texels(const struct render_plan *plan)
     return count;
 }
 
-/* Texels of all translucent shadow maps; and pixels that gather from them, of each map its object's. */
+/* Texels of all translucent shadow maps; samples of the pattern; and pixels that gather from them, of each
+ * map its object's. */
 static inline double render_cost_map_texels(const struct render_plan *plan)
 {
     double count = 0;
     for (size_t i = 0; i < plan->map_count; i++)
         count += (double)plan->maps[i].size_px * plan->maps[i].size_px;
     return count;
+}
+
+static inline double render_cost_map_samples(const struct render_plan *plan)
+{
+    return plan->tsm.sample_count > 0 ? plan->tsm.sample_count : RENDER_TSM_USUAL_SAMPLES;
 }
 
 static inline double render_cost_map_pixels(const struct render_plan *plan)

@@ -49,10 +49,10 @@ static const int sample_counts[] = { 0, 13, 21, 53, 117, 245 };
 
 /* ---- results ------------------------------------------------------------------------------------ */
 
-/* null where nothing bounds the error. */
-static json_t *create_error(double error)
+/* null where nothing bounds an error, or no time was predicted. */
+static json_t *create_number(double number)
 {
-    return isfinite(error) ? json_real(error) : json_null();
+    return isfinite(number) ? json_real(number) : json_null();
 }
 
 /* NULL: no memory, or a path that is not UTF-8. */
@@ -61,10 +61,10 @@ static json_t *create_result(const struct render_report *report, const char *pat
     json_t *const effects = json_array();
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
-        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:f, s:f, s:o}", "name", effect->name,
+        json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:o, s:f, s:o}", "name", effect->name,
                                                  "active", effect->is_active, "reason", effect->reason,
-                                                 "predicted_ms", effect->predicted_ms, "ms",
-                                                 effect->time_ms, "error", create_error(effect->error)));
+                                                 "predicted_ms", create_number(effect->predicted_ms), "ms",
+                                                 effect->time_ms, "error", create_number(effect->error)));
     }
     return json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique", render_technique_names[report->technique],
                      "epsilon", report->epsilon, "effects", effects, "total_ms", report->total_ms, "image",
@@ -111,8 +111,11 @@ static void print_plan(const struct render_report *report)
         char error[16] = "unbound.";
         if (isfinite(effect->error))
             snprintf(error, sizeof error, "%.2g", effect->error);
-        printf("%-16s  %-6s  %9.1f  %9.1f  %8s  %s\n", effect->name, effect->is_active ? "yes" : "no",
-               effect->predicted_ms, effect->time_ms, error, effect->reason);
+        char predicted[16] = "-";
+        if (isfinite(effect->predicted_ms))
+            snprintf(predicted, sizeof predicted, "%.1f", effect->predicted_ms);
+        printf("%-16s  %-6s  %9s  %9.1f  %8s  %s\n", effect->name, effect->is_active ? "yes" : "no",
+               predicted, effect->time_ms, error, effect->reason);
     }
 }
 

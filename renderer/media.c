@@ -1,6 +1,7 @@
 #include "renderer/media.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -118,4 +119,26 @@ double render_medium_spacing_mm(const struct render_medium *medium, double epsil
                                 dipole_stack_splat_spacing_mm(medium->stacks[c], DIPOLE_FACE_LIT, epsilon));
     }
     return narrowest_mm;
+}
+
+double render_medium_shortest_path_mm(const struct render_medium *medium)
+{
+    double shortest_mm = INFINITY;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const size_t count = dipole_stack_layer_count(medium->stacks[c]);
+        for (size_t i = 0; i < count && medium->diffuse_reflectance[c] > 0; i++)
+            shortest_mm =
+                fmin(shortest_mm, dipole_stack_coefficients(medium->stacks[c], i)->mean_free_path_mm);
+    }
+    return shortest_mm;
+}
+
+const char *render_media_list_names(const struct render_media *media, char *names, size_t size)
+{
+    names[0] = '\0';
+    for (size_t m = 0; m < media->count; m++) {
+        const size_t length = strlen(names);
+        snprintf(names + length, size - length, "%s%s", m > 0 ? "," : "", media->media[m].material->name);
+    }
+    return names;
 }

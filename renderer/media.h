@@ -43,4 +43,10 @@ void render_media_destroy(struct render_media *media);
 double render_medium_r_max_mm(const struct render_medium *medium, double epsilon);
 double render_medium_spacing_mm(const struct render_medium *medium, double epsilon);
 
+/* The shortest mean free path of any layer of a channel that scatters; INFINITY where none does. */
+double render_medium_shortest_path_mm(const struct render_medium *medium);
+
+/* Names of all the materials, between commas; cut off at size. Returns names. */
+const char *render_media_list_names(const struct render_media *media, char *names, size_t size);
+
 #endif

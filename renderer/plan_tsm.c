@@ -1,13 +1,11 @@
 /* Translucent shadow maps: how many, where from, how finely, and what is known of their error. */
+#include "renderer/frusta.h"
 #include "renderer/plan_internal.h"
 #include "renderer/volumes.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define PI 3.14159265358979323846
-#define COUNT(array) (sizeof(array) / sizeof *(array))
 
 const char *const render_tsm_gather_names[] = { "fragment", "vertex", NULL };
 const char *const render_tsm_response_names[] = { "table", "exact", "texels", "profile", NULL };
@@ -19,34 +17,12 @@ enum {
     TEXELS_PER_CELL = 2, /* along a cell of the local response, at least             */
 };
 
-/* Of the light, what comes from beyond the pattern (theory.md T32). */
-#define EXTENT_EPSILON 0.03
-
-/* A light that sees an object this wide or less gets one map of it; of a wider one six. */
-#define SINGLE_MAP_ANGLE_RAD (100 * PI / 180)
-
 /* Faces of a cube overlap by so much: what a sample next to an edge averages is seen whole. */
 #define CUBE_HALF_WIDTH 2.0
 
-/* Patterns (lutgen/tsm_pattern.c): samples, slices of the volume, inner squares side by side. */
-static const struct {
-    int sample_count, slice_count;
-    double extent;
-} patterns[] = { { 21, 32, 9 }, { 13, 16, 3 }, { 53, 64, 16 }, { 117, 128, 36 }, { 245, 256, 29 } };
-
-/* The row of that many samples, 0 the usual; the end of the table when there is none. */
-static size_t find_pattern(int sample_count)
-{
-    size_t row = 0;
-    while (sample_count != 0 && row < COUNT(patterns) && patterns[row].sample_count != sample_count)
-        row++;
-    return row;
-}
-
 int render_plan_slice_count(int sample_count)
 {
-    const size_t row = find_pattern(sample_count);
-    return row < COUNT(patterns) ? patterns[row].slice_count : 0;
+    return lut_tsm_slices(sample_count > 0 ? sample_count : RENDER_TSM_USUAL_SAMPLES);
 }
 
 static bool is_all_texels(enum render_tsm_response response)
@@ -86,10 +62,11 @@ static void find_patterns(const struct render_request *request, struct render_pl
         struct render_plan_medium *const planned = &plan->of_medium[m];
         if (!planned->is_visible || !plan->media->media[m].has_scattering)
             continue;
-        planned->inner_mm = request->volumes
-                                ? request->volumes[m]->inner_mm
-                                : 2 * render_medium_r_max_mm(&plan->media->media[m], EXTENT_EPSILON) /
-                                      patterns[find_pattern(request->tsm.sample_count)].extent;
+        planned->inner_mm =
+            request->volumes
+                ? request->volumes[m]->inner_mm
+                : lut_tsm_inner_mm(render_medium_r_max_mm(&plan->media->media[m], LUT_TSM_EXTENT_EPSILON),
+                                   render_plan_slice_count(request->tsm.sample_count));
     }
 }
 
@@ -120,74 +97,38 @@ static void choose_size(struct render_plan *plan, double width_mm, struct render
     map->texel_area = texel * texel;
 }
 
-static void directional_map(const struct io_scene *scene, struct render_plan *plan,
-                            struct render_plan_view *map)
+static double distance_mm(const double a_mm[3], const double b_mm[3])
 {
-    const double up[3] = { 0, 1, 0 };
-    const struct io_mesh *const mesh = scene->objects[map->object].mesh;
-    double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
-    map->projection.is_orthographic = true;
-    render_projection_aim(&map->projection, scene->lights[map->light].direction, up);
-    for (size_t v = 0; v < mesh->vertex_count; v++) {
-        const float *const p = &mesh->positions[3 * v];
-        const double position_mm[3] = { (double)p[0], (double)p[1], (double)p[2] };
-        double in_view[3];
-        render_projection_to_view(&map->projection, position_mm, in_view);
-        for (int k = 0; k < 3; k++) {
-            min[k] = fmin(min[k], in_view[k]);
-            max[k] = fmax(max[k], in_view[k]);
-        }
-    }
-    const double slack_mm = 1e-3 * plan->objects[map->object].ball.radius_mm;
-    const double half = 0.5 * fmax(max[0] - min[0], max[1] - min[1]) * (1 + 2.0 / MAP_SIDE_MIN);
-    map->projection.half_width = map->projection.half_height = fmax(half, slack_mm);
-    map->projection.near_mm = slack_mm;
-    map->projection.far_mm = max[2] - min[2] + 3 * slack_mm;
-    for (int k = 0; k < 3; k++)
-        map->projection.eye_mm[k] = 0.5 * (min[0] + max[0]) * map->projection.right[k] +
-                                    0.5 * (min[1] + max[1]) * map->projection.up[k] +
-                                    (min[2] - 2 * slack_mm) * map->projection.forward[k];
-    choose_size(plan, 2 * map->projection.half_width, map);
+    const double step_mm[3] = { a_mm[0] - b_mm[0], a_mm[1] - b_mm[1], a_mm[2] - b_mm[2] };
+    return sqrt(render_dot(step_mm, step_mm));
 }
 
-/* One map or six; returns how many. */
-static size_t point_maps(const struct io_scene *scene, struct render_plan *plan,
-                         struct render_plan_view *maps)
+/* One map or six of an object; returns how many. */
+static size_t object_maps(const struct io_scene *scene, struct render_plan *plan, size_t light,
+                          size_t object, struct render_plan_view *maps)
 {
-    struct render_plan_view map = maps[0];
-    const struct render_ball *const ball = &plan->objects[map.object].ball;
-    const double *const position_mm = scene->lights[map.light].position_mm;
-    double toward[3], up[3] = { 0, 1, 0 };
-    for (int k = 0; k < 3; k++)
-        toward[k] = ball->centre_mm[k] - position_mm[k];
-    const double distance_mm = sqrt(render_dot(toward, toward)), radius_mm = ball->radius_mm;
-    memcpy(map.projection.eye_mm, position_mm, sizeof map.projection.eye_mm);
-    map.projection.far_mm = (distance_mm + radius_mm) * 1.001;
-    map.projection.near_mm = fmax((distance_mm - radius_mm) * 0.999, 1e-4 * radius_mm);
-    if (distance_mm > radius_mm && 2 * asin(radius_mm / distance_mm) <= SINGLE_MAP_ANGLE_RAD) {
-        for (int k = 0; k < 3; k++)
-            toward[k] /= distance_mm;
-        render_projection_aim(&map.projection, toward, up);
-        map.projection.half_width = map.projection.half_height =
-            tan(asin(radius_mm / distance_mm)) * (1 + 2.0 / MAP_SIDE_MIN);
-        choose_size(plan, 2 * map.projection.half_width * distance_mm, &map);
-        maps[0] = map;
-        return 1;
+    const struct io_light *const source = &scene->lights[light];
+    const struct render_ball *const ball = &plan->objects[object].ball;
+    const double margin = 1 + 2.0 / MAP_SIDE_MIN; /* a texel on each side */
+    struct render_projection frusta[RENDER_FACES];
+    struct render_plan_view map = { .light = light, .object = object };
+    size_t count = 1;
+    double sized_at_mm = 1; /* distance at which texels are as fine as wanted */
+    if (source->kind == IO_LIGHT_POINT) {
+        count = render_frusta_of_point(source->position_mm, ball, margin, CUBE_HALF_WIDTH, frusta);
+        sized_at_mm = fmax(distance_mm(source->position_mm, ball->centre_mm), ball->radius_mm);
+    } else {
+        render_frustum_of_parallel(source->direction, &scene->objects[object], 1, ball, margin, frusta);
     }
-    map.is_cube_face = true;
-    map.projection.near_mm *= 1 / (1 + CUBE_HALF_WIDTH); /* corners are farther away than they are deep */
-    map.projection.half_width = map.projection.half_height = CUBE_HALF_WIDTH;
-    choose_size(plan, 2 * CUBE_HALF_WIDTH * fmax(distance_mm, radius_mm), &map);
-    for (int face = 0; face < 6; face++) {
-        double forward[3] = { 0, 0, 0 };
-        forward[face / 2] = face % 2 ? -1 : 1;
-        up[1] = face / 2 != 1;
-        up[2] = face / 2 == 1;
-        maps[face] = map;
-        maps[face].face = face;
-        render_projection_aim(&maps[face].projection, forward, up);
+    map.is_cube_face = count > 1;
+    map.projection = frusta[0];
+    choose_size(plan, 2 * map.projection.half_width * sized_at_mm, &map); /* alike for all faces */
+    for (size_t i = 0; i < count; i++) {
+        maps[i] = map;
+        maps[i].projection = frusta[i];
+        maps[i].face = (int)i;
     }
-    return 6;
+    return count;
 }
 
 static bool takes_maps(const struct render_plan *plan, size_t object)
@@ -220,14 +161,7 @@ bool render_plan_make_maps(const struct render_request *request, struct render_p
         for (size_t object = 0; object < scene->object_count; object++) {
             if (!render_light_shines(&scene->lights[light]) || !takes_maps(plan, object))
                 continue;
-            struct render_plan_view *const map = &plan->maps[plan->map_count];
-            *map = (struct render_plan_view){ .light = light, .object = object };
-            if (scene->lights[light].kind == IO_LIGHT_POINT) {
-                plan->map_count += point_maps(scene, plan, map);
-            } else {
-                directional_map(scene, plan, map);
-                plan->map_count++;
-            }
+            plan->map_count += object_maps(scene, plan, light, object, &plan->maps[plan->map_count]);
         }
     }
     return true;

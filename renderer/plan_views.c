@@ -1,11 +1,9 @@
 /* What the lights see: how many views, where from, how finely. */
+#include "renderer/frusta.h"
 #include "renderer/plan_internal.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-
-#define PI 3.14159265358979323846
 
 /* Cells of a light's view are so wide, as part of the spacing: surfaces up to 45 degrees from facing the
  * light need not be split, and few are sampled more densely than they need. */
@@ -18,8 +16,8 @@ enum {
     BLOCK_LEVELS_LIMIT = 7, /* blocks are searched once for each level: larger ones save few samples */
 };
 
-/* A point light this wide or less, seen from it, gets one view; a wider scene six. */
-#define SINGLE_VIEW_ANGLE_RAD (100 * PI / 180)
+/* A texel of margin on each side, so that no edge is lost to rounding. */
+static const double margin = 1 + 2.0 / VIEW_SIDE_WANTED;
 
 /* By how many levels the blocks of the coarsest medium may be larger than those of the narrowest. */
 static int levels_of_coarsest(const struct render_plan *plan)
@@ -60,75 +58,23 @@ static void choose_view_size(const struct render_plan *plan, struct render_plan_
     view->texel_area = texel * texel;
 }
 
-static struct render_plan_view directional_view(const struct io_scene *scene,
-                                                const struct render_plan *plan, size_t light)
+/* One view or six of a light; returns how many. */
+static size_t light_views(const struct io_scene *scene, const struct render_plan *plan, size_t light,
+                          struct render_plan_view *views)
 {
-    struct render_plan_view view = { .light = light, .projection = { .is_orthographic = true } };
-    const double up[3] = { 0, 1, 0 };
-    render_projection_aim(&view.projection, scene->lights[light].direction, up);
-    double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
-    for (size_t i = 0; i < scene->object_count; i++) {
-        const struct io_mesh *const mesh = scene->objects[i].mesh;
-        for (size_t v = 0; v < mesh->vertex_count; v++) {
-            const float *const p = &mesh->positions[3 * v];
-            const double position_mm[3] = { (double)p[0], (double)p[1], (double)p[2] };
-            double in_view[3];
-            render_projection_to_view(&view.projection, position_mm, in_view);
-            for (int k = 0; k < 3; k++) {
-                min[k] = fmin(min[k], in_view[k]);
-                max[k] = fmax(max[k], in_view[k]);
-            }
-        }
-    }
-    /* A texel of margin on each side, so that no edge is lost to rounding. */
-    const double margin = 1 + 2.0 / VIEW_SIDE_WANTED, slack_mm = 1e-3 * plan->ball.radius_mm;
-    const double half = 0.5 * fmax(max[0] - min[0], max[1] - min[1]) * margin;
-    view.projection.half_width = view.projection.half_height = fmax(half, slack_mm);
-    view.projection.near_mm = slack_mm;
-    view.projection.far_mm = max[2] - min[2] + 3 * slack_mm;
-    for (int k = 0; k < 3; k++)
-        view.projection.eye_mm[k] = 0.5 * (min[0] + max[0]) * view.projection.right[k] +
-                                    0.5 * (min[1] + max[1]) * view.projection.up[k] +
-                                    (min[2] - 2 * slack_mm) * view.projection.forward[k];
-    return view;
-}
-
-/* Fill one view or six; returns how many. */
-static size_t point_views(const struct io_scene *scene, const struct render_plan *plan, size_t light,
-                          struct render_plan_view views[6])
-{
-    const double *const position_mm = scene->lights[light].position_mm;
-    double toward[3], up[3] = { 0, 1, 0 };
-    for (int k = 0; k < 3; k++)
-        toward[k] = plan->ball.centre_mm[k] - position_mm[k];
-    const double distance_mm = sqrt(render_dot(toward, toward)), radius_mm = plan->ball.radius_mm;
-    struct render_plan_view view = { .light = light };
-    memcpy(view.projection.eye_mm, position_mm, sizeof view.projection.eye_mm);
-    view.projection.far_mm = (distance_mm + radius_mm) * 1.001;
-    view.projection.near_mm = fmax((distance_mm - radius_mm) * 0.999, 1e-4 * radius_mm);
-
-    if (distance_mm > radius_mm && 2 * asin(radius_mm / distance_mm) <= SINGLE_VIEW_ANGLE_RAD) {
-        for (int k = 0; k < 3; k++)
-            toward[k] /= distance_mm;
-        render_projection_aim(&view.projection, toward, up);
-        view.projection.half_width = view.projection.half_height =
-            tan(asin(radius_mm / distance_mm)) * (1 + 2.0 / VIEW_SIDE_WANTED);
-        views[0] = view;
-        return 1;
-    }
-    view.is_cube_face = true;
-    view.projection.near_mm *= 0.577; /* the corner of a face is sqrt(3) times as far away as it is deep */
-    view.projection.half_width = view.projection.half_height = 1;
-    for (int face = 0; face < 6; face++) {
-        double forward[3] = { 0, 0, 0 };
-        forward[face / 2] = face % 2 ? -1 : 1;
-        up[1] = face / 2 != 1;
-        up[2] = face / 2 == 1;
-        views[face] = view;
-        views[face].face = face;
-        render_projection_aim(&views[face].projection, forward, up);
-    }
-    return 6;
+    const struct io_light *const source = &scene->lights[light];
+    struct render_projection frusta[RENDER_FACES];
+    size_t count = 1;
+    if (source->kind == IO_LIGHT_POINT)
+        count = render_frusta_of_point(source->position_mm, &plan->ball, margin, 1, frusta);
+    else
+        render_frustum_of_parallel(source->direction, scene->objects, scene->object_count, &plan->ball,
+                                   margin, frusta);
+    for (size_t i = 0; i < count; i++)
+        views[i] = (struct render_plan_view){
+            .light = light, .projection = frusta[i], .is_cube_face = count > 1, .face = (int)i
+        };
+    return count;
 }
 
 double render_plan_widest_spacing_mm(const struct render_plan *plan)
@@ -153,15 +99,8 @@ bool render_plan_make_views(const struct render_request *request, struct render_
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the views of %zu lights",
                            plan->lit_count);
     for (size_t i = 0; i < scene->light_count; i++) {
-        if (!render_light_shines(&scene->lights[i]))
-            continue;
-        struct render_plan_view *const view = &plan->views[plan->view_count];
-        if (scene->lights[i].kind == IO_LIGHT_POINT) {
-            plan->view_count += point_views(scene, plan, i, view);
-        } else {
-            *view = directional_view(scene, plan, i);
-            plan->view_count++;
-        }
+        if (render_light_shines(&scene->lights[i]))
+            plan->view_count += light_views(scene, plan, i, &plan->views[plan->view_count]);
     }
     for (size_t i = 0; i < plan->view_count; i++)
         choose_view_size(plan, &plan->views[i]);

@@ -245,6 +245,7 @@ static void add_doubling(struct reference *reference)
         error = fmax(error, FALL_LIMIT * report->doublings[report->doubling_count - 1].error);
     report->sample_count = 2 * reference->point_count;
     report->error_predicted = error;
+    report->effects[ROW_INTEGRAL].error = error;
     report->spacing_mm = spacing_mm(reference);
     report->doublings[report->doubling_count++] =
         (struct render_doubling){ .sample_count = report->sample_count, .error = error };
@@ -423,23 +424,12 @@ static void set_attributes(const struct reference *reference)
     io_image_set_text(image, "dipole:kind", "picture");
     io_image_set_text(image, "dipole:version", dipole_version());
     io_image_set_text(image, "dipole:technique", render_technique_names[RENDER_TECHNIQUE_REFERENCE]);
-    io_image_set_text(image, "dipole:material", reference->scene->objects[0].material.name);
+    char names[512];
+    io_image_set_text(image, "dipole:material",
+                      render_media_list_names(reference->media, names, sizeof names));
     io_image_set_number(image, "dipole:epsilon", reference->report.epsilon);
     io_image_set_number(image, "dipole:error_estimated", reference->report.error_predicted);
     io_image_set_number(image, "dipole:sample_count", (double)reference->report.sample_count);
-}
-
-/* Shortest mean free path of the channels that scatter. */
-static double shortest_path_mm(const struct render_medium *medium)
-{
-    double shortest_mm = INFINITY;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        const size_t count = dipole_stack_layer_count(medium->stacks[c]);
-        for (size_t i = 0; i < count && medium->diffuse_reflectance[c] > 0; i++)
-            shortest_mm =
-                fmin(shortest_mm, dipole_stack_coefficients(medium->stacks[c], i)->mean_free_path_mm);
-    }
-    return shortest_mm;
 }
 
 static bool read_media(struct reference *reference, dipole_status *status)
@@ -454,7 +444,7 @@ static bool read_media(struct reference *reference, dipole_status *status)
     reference->path_mm = INFINITY;
     for (size_t i = 0; i < scene->object_count; i++) {
         const struct render_medium *const medium = &reference->media->media[reference->media->of_object[i]];
-        const double path_mm = shortest_path_mm(medium);
+        const double path_mm = render_medium_shortest_path_mm(medium);
         reference->path_mm = fmin(reference->path_mm, path_mm);
         reference->pixel_media[i] = (struct render_pixel_medium){
             .eta = medium->eta,
@@ -516,7 +506,8 @@ bool render_reference_draw(const struct io_scene *scene, const struct render_opt
                                                 .epsilon = epsilon,
                                                 .effect_count = ROW_COUNT };
     for (int row = 0; row < ROW_COUNT; row++)
-        reference->report.effects[row].name = row_names[row];
+        reference->report.effects[row] =
+            (struct render_effect_report){ .name = row_names[row], .predicted_ms = (double)NAN };
     show(reference, "surface integral", 0);
     bool done = begin(reference, status);
     reference->report.effects[ROW_SURFACE].time_ms = now_ms() - start_ms;

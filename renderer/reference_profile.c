@@ -27,18 +27,6 @@ static const double bound_margin = 1.25;
 /* Near 0 a smooth profile changes over this part of a mean free path or more. */
 static const double smooth_share = 0.25;
 
-static double shortest_path_mm(const struct render_medium *medium)
-{
-    double shortest_mm = INFINITY;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        const size_t count = dipole_stack_layer_count(medium->stacks[c]);
-        for (size_t i = 0; i < count && medium->diffuse_reflectance[c] > 0; i++)
-            shortest_mm =
-                fmin(shortest_mm, dipole_stack_coefficients(medium->stacks[c], i)->mean_free_path_mm);
-    }
-    return shortest_mm;
-}
-
 static double bits_to_place(uint64_t bits)
 {
     double place;
@@ -242,7 +230,7 @@ bool render_profile_create(const struct render_medium *medium, double far_mm, do
     *profile = (struct render_profile){ .far_mm = far_mm * (1 + 1e-6) };
     const dipole_model model = medium->material->model;
     profile->is_singular = model == DIPOLE_MODEL_BEAM || model == DIPOLE_MODEL_MODES;
-    double path_mm = shortest_path_mm(medium);
+    double path_mm = render_medium_shortest_path_mm(medium);
     if (!isfinite(path_mm))
         path_mm = far_mm; /* nothing scatters: all is 0 */
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {

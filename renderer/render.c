@@ -152,24 +152,13 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
     memcpy(report->notes, plan->notes, sizeof report->notes);
 }
 
-/* Names of the media, between commas. */
-static const char *list_materials(const struct render_media *media, char *names, size_t size)
-{
-    names[0] = '\0';
-    for (size_t m = 0; m < media->count; m++) {
-        const size_t length = strlen(names);
-        snprintf(names + length, size - length, "%s%s", m > 0 ? "," : "", media->media[m].material->name);
-    }
-    return names;
-}
-
 static void set_attributes(struct io_image *image, const struct render_plan *plan)
 {
     char names[512];
     io_image_set_text(image, "dipole:kind", "picture");
     io_image_set_text(image, "dipole:version", dipole_version());
     io_image_set_text(image, "dipole:technique", render_technique_names[plan->technique]);
-    io_image_set_text(image, "dipole:material", list_materials(plan->media, names, sizeof names));
+    io_image_set_text(image, "dipole:material", render_media_list_names(plan->media, names, sizeof names));
     io_image_set_number(image, "dipole:epsilon", plan->epsilon);
     if (render_plan_reads(plan, "light_samples")) {
         io_image_set_number(image, "dipole:error_predicted", plan->error_predicted);

@@ -96,7 +96,7 @@ struct render_tsm_options {
     int layer_count;  /* 0: all between a point and where its light entered is taken for solid; else so many
                          surfaces behind each other, even, up to RENDER_TSM_LAYER_LIMIT, tell what is air */
 };
-enum { RENDER_TSM_LAYER_LIMIT = 16 };
+enum { RENDER_TSM_LAYER_LIMIT = 16, RENDER_TSM_USUAL_SAMPLES = 21 };
 
 struct render_options {
     enum render_technique technique;
@@ -126,8 +126,9 @@ struct render_effect_report {
     const char *name;
     bool is_active;
     char reason[160];
-    double predicted_ms, time_ms;
-    double error; /* predicted, that it leaves */
+    double predicted_ms; /* NAN: of the reference nothing is predicted            */
+    double time_ms;
+    double error; /* predicted, that it leaves; INFINITY: nothing bounds it  */
 };
 
 /* What was done, why, and how long it took. */

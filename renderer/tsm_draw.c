@@ -395,6 +395,15 @@ int render_tsm_source_count(const struct render_frame *frame)
     return counts[0] + counts[1] + counts[2];
 }
 
+const char *render_tsm_unsampled_reason(const struct render_request *request,
+                                        const struct render_plan *plan)
+{
+    const char *const idle = render_tsm_idle_reason(request, plan);
+    const bool is_all_texels =
+        request->tsm.response == RENDER_TSM_TEXELS || request->tsm.response == RENDER_TSM_PROFILE;
+    return idle ? idle : is_all_texels ? "all texels are summed" : NULL;
+}
+
 const char *render_tsm_idle_reason(const struct render_request *request, const struct render_plan *plan)
 {
     if (request->is_captured)

@@ -31,5 +31,8 @@ int render_tsm_source_count(const struct render_frame *frame);
 
 /* For decide(): why technique tsm has nothing to do, or NULL. */
 const char *render_tsm_idle_reason(const struct render_request *request, const struct render_plan *plan);
+/* The same of effects that work with the samples of the pattern. */
+const char *render_tsm_unsampled_reason(const struct render_request *request,
+                                        const struct render_plan *plan);
 
 #endif

@@ -10,11 +10,9 @@
 
 static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
 {
-    const char *const idle = render_tsm_idle_reason(request, plan);
+    const char *const idle = render_tsm_unsampled_reason(request, plan);
     if (idle)
         return render_not_called_for("%s", idle);
-    if (request->tsm.response == RENDER_TSM_TEXELS || request->tsm.response == RENDER_TSM_PROFILE)
-        return render_not_called_for("all texels are summed");
     if (request->tsm.gather == RENDER_TSM_VERTEX)
         return render_not_called_for("gathered at vertices");
     if (request->tsm.part == RENDER_TSM_LOCAL)
@@ -22,13 +20,11 @@ static struct render_decision decide(const struct render_request *request, const
     return render_called_for("at each fragment; what the samples miss is not bounded");
 }
 
-/* Of the usual pattern. */
-enum { SAMPLES = 21 };
-
 static double cost_ms(const struct render_plan *plan)
 {
     return RENDER_COST_PROGRAM_MS +
-           render_cost_ms(RENDER_COST_MAP_SAMPLE, SAMPLES * render_cost_map_pixels(plan));
+           render_cost_ms(RENDER_COST_MAP_SAMPLE,
+                          render_cost_map_samples(plan) * render_cost_map_pixels(plan));
 }
 
 /* Nothing bounds what so few samples make of an arbitrary shape. */

@@ -8,11 +8,9 @@
 
 static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
 {
-    const char *const idle = render_tsm_idle_reason(request, plan);
+    const char *const idle = render_tsm_unsampled_reason(request, plan);
     if (idle)
         return render_not_called_for("%s", idle);
-    if (request->tsm.response == RENDER_TSM_TEXELS || request->tsm.response == RENDER_TSM_PROFILE)
-        return render_not_called_for("all texels are summed");
     if (request->tsm.part == RENDER_TSM_GLOBAL)
         return render_not_called_for("the global part alone is asked for");
     return render_called_for("%d x %d cells about each fragment", LUT_TSM_LOCAL_SIDE, LUT_TSM_LOCAL_SIDE);

@@ -8,11 +8,9 @@
 
 static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
 {
-    const char *const idle = render_tsm_idle_reason(request, plan);
+    const char *const idle = render_tsm_unsampled_reason(request, plan);
     if (idle)
         return render_not_called_for("%s", idle);
-    if (request->tsm.response == RENDER_TSM_TEXELS || request->tsm.response == RENDER_TSM_PROFILE)
-        return render_not_called_for("all texels are summed");
     if (request->tsm.response == RENDER_TSM_EXACT)
         return render_called_for("for the places of the samples");
     return render_called_for("volumes are within %.2g of the response", plan->table_error);
