@@ -5,26 +5,6 @@
 #include "renderer/footprint.h"
 #include "renderer/plan.h"
 
-/* What leaves a surface that faces the eye, in radiance, for one unit of radiosity. */
-static double exit_per_sr(double eta)
-{
-    return (1 - dipole_fresnel_reflectance(eta, 1)) / (PI * dipole_fdt_outside(eta));
-}
-
-/* One medium of a model, the same in all channels, or two layers of it. */
-static struct io_material grey(dipole_model model, bool is_layered)
-{
-    struct io_material material = { .model = model, .layer_count = is_layered ? 2 : 1 };
-    strcpy(material.name, io_model_names[model]);
-    for (int c = 0; c < 3; c++) {
-        const dipole_medium top = { .sigma_a_per_mm = 0.3, .sigma_s_prime_per_mm = 4, .eta = 1.4 };
-        const dipole_medium base = { .sigma_a_per_mm = 0.1, .sigma_s_prime_per_mm = 2, .eta = 1.4 };
-        material.layers[c][0] = (dipole_layer){ top, is_layered ? 0.8 : INFINITY };
-        material.layers[c][1] = (dipole_layer){ base, INFINITY };
-    }
-    return material;
-}
-
 static const struct {
     dipole_model model;
     bool is_layered;

@@ -66,18 +66,6 @@ static const struct {
     bool is_layered;
 } models[] = { { DIPOLE_MODEL_DIPOLE, false }, { DIPOLE_MODEL_BEAM, false }, { DIPOLE_MODEL_MODES, true } };
 
-static struct io_material grey(dipole_model model, bool is_layered)
-{
-    struct io_material material = { .name = "grey", .model = model, .layer_count = is_layered ? 2 : 1 };
-    for (int c = 0; c < 3; c++) {
-        const dipole_medium top = { .sigma_a_per_mm = 0.3, .sigma_s_prime_per_mm = 4, .eta = 1.4 };
-        const dipole_medium base = { .sigma_a_per_mm = 0.1, .sigma_s_prime_per_mm = 2, .eta = 1.4 };
-        material.layers[c][0] = (dipole_layer){ top, is_layered ? 0.8 : INFINITY };
-        material.layers[c][1] = (dipole_layer){ base, INFINITY };
-    }
-    return material;
-}
-
 /* Largest relative error of the radiosity in the middle of a slab, lit by tilt away from straight above. */
 static double slab_error(const struct io_material *material, double tilt, bool is_point)
 {
