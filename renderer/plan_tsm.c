@@ -97,6 +97,21 @@ static void choose_size(struct render_plan *plan, double width_mm, struct render
     map->texel_area = texel * texel;
 }
 
+/* Sources are fitted to what leaves a flat surface. Those of layers lie deep, and light a curved one
+ * wrongly: docs/rendering.md. */
+static void note_layers(struct render_plan *plan)
+{
+    for (size_t m = 0; m < plan->media->count; m++) {
+        const struct io_material *const material = plan->media->media[m].material;
+        if (plan->of_medium[m].is_visible && material->layer_count > 1)
+            render_plan_add_note(
+                plan,
+                "material \"%.60s\" has layers, whose response in translucent shadow maps is right "
+                "on flat surfaces alone: splats draw it on any",
+                material->name);
+    }
+}
+
 static double distance_mm(const double a_mm[3], const double b_mm[3])
 {
     const double step_mm[3] = { a_mm[0] - b_mm[0], a_mm[1] - b_mm[1], a_mm[2] - b_mm[2] };
@@ -147,6 +162,7 @@ bool render_plan_make_maps(const struct render_request *request, struct render_p
         return false;
     plan->tsm = request->tsm;
     find_patterns(request, plan);
+    note_layers(plan);
     if (request->tsm.gather == RENDER_TSM_VERTEX)
         for (size_t i = 0; i < scene->object_count; i++)
             plan->vertex_count += scene->objects[i].mesh->vertex_count;

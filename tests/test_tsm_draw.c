@@ -2,6 +2,7 @@
  * sums and other techniques. */
 #include "drawing.h"
 
+#include "renderer/plan.h"
 #include "renderer/volumes.h"
 
 #include <unistd.h>
@@ -126,6 +127,31 @@ static void energy_is_nearly_conserved_at_an_angle(void **state)
     print_message("  point light %.2f %%, at 45 degrees %.1f %%, at 63 %.1f %%\n", 100 * point, 100 * steep,
                   100 * grazing);
     assert_true(point < 0.005 && steep < 0.05 && grazing < 0.2);
+}
+
+/* Oracle: the measurements of docs/rendering.md. Layers in a translucent shadow map are warned of, in
+ * splats they are not. */
+static void layers_are_warned_of(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        const struct io_material material = grey(DIPOLE_MODEL_BEAM, i > 0);
+        struct test_scene test;
+        scene_init(&test, 40);
+        assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 5, 0, &material));
+        scene_add_directional(&test, 0, 0, -1, 3);
+        struct render_plan *plan;
+        const struct render_request request = { .scene = &test.scene,
+                                                .epsilon = 0.05,
+                                                .technique = i == 2 ? RENDER_TECHNIQUE_SPLAT
+                                                                    : RENDER_TECHNIQUE_TSM };
+        assert_true(render_plan_create(&request, &plan, NULL));
+        assert_int_equal(plan->note_count, i == 1);
+        if (i == 1)
+            assert_non_null(strstr(plan->notes[0], "material \"beam\" has layers"));
+        render_plan_destroy(plan);
+        scene_end(&test);
+    }
 }
 
 /* ---- parts of the error ------------------------------------------------------------------------- */
@@ -383,6 +409,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(energy_is_conserved),
         cmocka_unit_test(energy_is_nearly_conserved_at_an_angle),
+        cmocka_unit_test(layers_are_warned_of),
         cmocka_unit_test(the_table_errs_as_it_states),
         cmocka_unit_test(all_texels_with_the_profile_are_the_splats),
         cmocka_unit_test(samples_approach_all_texels),
