@@ -8,8 +8,10 @@
 
 #include "renderer/plan.h"
 
-/* A program that is compiled or found in a cache, and first run. */
+/* A program that is compiled or found in a cache, and first run; what makes the levels of maps, the same.
+ */
 #define RENDER_COST_PROGRAM_MS 5.0
+#define RENDER_COST_LEVELS_MS 60.0
 
 /* Nanoseconds each. */
 #define RENDER_COST_TRIANGLE 120.0        /* drawn once, whatever it covers               */
@@ -20,8 +22,10 @@
 #define RENDER_COST_SHADOW_PIXEL 400.0    /* lit and shaded at one point                  */
 #define RENDER_COST_COMPOSITE_PIXEL 220.0 /* covered                                      */
 #define RENDER_COST_SPLAT_EVALUATION 2.8  /* one sample at one pixel                      */
-#define RENDER_COST_MAP_TEXEL 120.0       /* of a translucent shadow map: drawn, levels made  */
-#define RENDER_COST_MAP_SAMPLE 90.0       /* one sample of a map at one point             */
+#define RENDER_COST_MAP_TEXEL 37.0        /* of a translucent shadow map: drawn, levels made  */
+#define RENDER_COST_MAP_SAMPLE 66.0       /* one sample of a map at one point             */
+#define RENDER_COST_MAP_LAYER 25.0        /* each layer that it looks into                */
+#define RENDER_COST_MAP_CELL 40.0         /* one cell of the local response at one pixel  */
 #define RENDER_COST_MAP_EVALUATION 20.0   /* one texel of a map at one pixel              */
 #define RENDER_COST_SCREEN_PIXEL 6.0      /* touched by a simple pass                     */
 #define RENDER_COST_POINTS_PIXEL 80.0     /* whose four points are looked at */
@@ -45,8 +49,8 @@ static inline double render_cost_view_texels(const struct render_plan *plan)
     return count;
 }
 
-/* Texels of all translucent shadow maps; samples of the pattern; and pixels that gather from them, of each
- * map its object's. */
+/* Texels of all translucent shadow maps; the time of the pattern's samples at some points; and pixels that
+ * gather from them, of each map its object's. */
 static inline double render_cost_map_texels(const struct render_plan *plan)
 {
     double count = 0;
@@ -55,9 +59,11 @@ static inline double render_cost_map_texels(const struct render_plan *plan)
     return count;
 }
 
-static inline double render_cost_map_samples(const struct render_plan *plan)
+static inline double render_cost_map_samples_ms(const struct render_plan *plan, double point_count)
 {
-    return plan->tsm.sample_count > 0 ? plan->tsm.sample_count : RENDER_TSM_USUAL_SAMPLES;
+    const int samples = plan->tsm.sample_count > 0 ? plan->tsm.sample_count : RENDER_TSM_USUAL_SAMPLES;
+    return render_cost_ms(RENDER_COST_MAP_SAMPLE + RENDER_COST_MAP_LAYER * plan->tsm.layer_count,
+                          samples * point_count);
 }
 
 static inline double render_cost_map_pixels(const struct render_plan *plan)

@@ -16,12 +16,12 @@ static struct render_decision decide(const struct render_request *request, const
     return render_called_for("volumes are within %.2g of the response", plan->table_error);
 }
 
-/* Of a volume, or of factors and sources: baked and uploaded. */
-#define BAKE_MS 15.0
+/* Of a volume: uploaded. It is baked before, and kept. */
+#define UPLOAD_MS 2.0
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return BAKE_MS * (double)plan->media->count;
+    return UPLOAD_MS * (double)plan->media->count;
 }
 
 static double error(const struct render_plan *plan)
