@@ -1,233 +1,195 @@
-/* fit: the scattering coefficients of a material from a picture of it. */
-#include "cli/cli.h"
-#include "fit/picture.h"
-#include "io/file.h"
+/* fit: the scattering coefficients of a material from pictures of it and other measurements. */
+#include "fit/batch.h"
+#include "fit/job.h"
 
-#include <jansson.h>
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
-struct options {
-    struct cli_common common;
-    const char *scene_path, *picture_path, *material_path, *start_path;
-    struct cli_texts allowed_paths;
-};
-
-/* What is read before, and told after. */
-struct job {
-    struct io_scene *scene;
-    struct io_image *picture;
-    struct io_material
-        material; /* eta and fdr of the scene's, first with the start's sigmas, then those found */
-    struct fit_picture_result result;
-    double seconds;
-};
-
 static const char details[] =
-    "SCENE.json says where camera, lights and objects are; its material gives eta. TARGET.exr is the "
-    "picture "
-    "of that scene, linear radiance in the scene's units, of the camera's size. MATERIAL.json will be a "
-    "material like any other, with a block \"fit\" that holds the 95 % intervals.\n"
+    "SCENE.json says where camera, lights and objects are; its material gives eta. TARGET is a picture of "
+    "that scene, of the camera's size, or two, three, ... times as large: EXR, HDR, TIFF, PNG or JPEG. "
+    "Several pairs are fitted together: "
+    "other "
+    "views, other lights, front and back. MATERIAL.json will be a material like any other, with a block "
+    "\"fit\" that holds the 95 % intervals.\n"
     "\n"
-    "Pictures written by render say how far their splats reach and how exact their table is. Of others, 1 "
-    "% of "
-    "uncertain exposure is taken into the intervals.\n"
+    "What is free besides the coefficients is said by --free; where a scene's light has no stated "
+    "brightness, the exposure is free by itself. Of a material with layers the first is sought, with its "
+    "thickness; the others are known. docs/fit.md says how to take pictures that tell a material.\n"
     "\n"
-    "  fit scenes/knot.json knot.exr --start materials/skin1.json -o found.json\n";
+    "  fit scenes/knot.json knot.exr --start materials/skin1.json -o found.json --report found\n"
+    "  fit front.json front.jpg back.json back.jpg --free exposure,white-balance -o wax.json\n"
+    "  fit --profile R.csv --eta 1.4 -o milk.json\n"
+    "\n" FIT_BATCH_DETAILS;
 
-/* ---- steps ------------------------------------------------------------------------------------------- */
+static volatile sig_atomic_t stop;
 
-static bool job_read(const struct cli_tool *tool, const struct options *options, struct job *job,
-                     dipole_status *status)
+/* The first Ctrl-C ends the fit with the best so far, a second one the program. */
+static void handle_interrupt(int number)
 {
-    const struct io_scene_options scene_options = { .allowed_paths = options->allowed_paths.values,
-                                                    .allowed_path_count = options->allowed_paths.count };
-    struct io_material start;
-    if (!io_file_check_writable(options->material_path, status) ||
-        !io_scene_read(options->scene_path, &scene_options, &job->scene, status) ||
-        !io_exr_read(options->picture_path, &job->picture, status))
-        return false;
-    const dipole_place place = { .source = options->scene_path };
-    if (job->scene->object_count == 0)
-        return dipole_fail(status, DIPOLE_BAD_VALUE, &place, "the scene has no object to fit");
-    if (job->scene->has_environment)
-        return dipole_fail(
-            status, DIPOLE_NOT_SUPPORTED, &place,
-            "the scene has an environment, which cannot be fitted to, expected lights alone");
-    job->material = job->scene->objects[0].material;
-    if (!io_material_check_classical(&job->material, status))
-        return false;
-    if (!options->start_path)
-        return true;
-    if (!io_material_open(options->start_path, &start, status) ||
-        !io_material_check_classical(&start, status))
-        return false;
-    if (start.warning[0])
-        cli_note(tool, &options->common, "%s: %s", options->start_path, start.warning);
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        job->material.layers[c][0].medium.sigma_a_per_mm = start.layers[c][0].medium.sigma_a_per_mm;
-        job->material.layers[c][0].medium.sigma_s_prime_per_mm =
-            start.layers[c][0].medium.sigma_s_prime_per_mm;
-    }
-    return true;
+    stop = 1;
+    signal(number, SIG_DFL);
 }
 
-static void show_progress(void *context, const char *what, double fraction)
+static bool run(const struct cli_tool *tool, const struct fit_job_options *options, dipole_status *status)
 {
-    cli_progress_show(context, what, fraction);
-}
-
-static bool job_fit(const struct cli_tool *tool, const struct options *options, struct job *job,
-                    dipole_status *status)
-{
-    struct cli_progress progress;
-    cli_progress_start(&progress, tool, &options->common);
-    const double start_s = cli_now_s();
-    dipole_medium start[IO_CHANNEL_COUNT];
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        start[c] = job->material.layers[c][0].medium;
-    const struct fit_picture_request request = {
-        .scene = job->scene,
-        .picture = job->picture,
-        .picture_path = options->picture_path,
-        .start = start,
-        .progress = { .show = show_progress, .context = &progress },
-    };
-    const bool done = fit_picture(&request, &job->result, status);
-    cli_progress_show(&progress, "done", 1.0);
-    job->seconds = cli_now_s() - start_s;
-    if (!done)
-        return false;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        job->material.layers[c][0].medium.sigma_a_per_mm = job->result.channels[c].sigma_a_per_mm;
-        job->material.layers[c][0].medium.sigma_s_prime_per_mm =
-            job->result.channels[c].sigma_s_prime_per_mm;
-    }
-    if (job->result.note[0])
-        cli_note(tool, &options->common, "%s", job->result.note);
-    return true;
-}
-
-/* ---- results ------------------------------------------------------------------------------------------
- */
-
-/* The "fit" block; NULL without memory. The caller ends it with json_decref. */
-static json_t *fit_block(const struct job *job)
-{
-    json_t *channels = json_array();
-    for (int c = 0; channels && c < FIT_CHANNEL_COUNT; c++) {
-        const struct fit_estimate *channel = &job->result.channels[c];
-        json_t *entry =
-            json_pack("{s:f, s:[f, f], s:f, s:[f, f], s:b, s:s}", "sigma_a_per_mm", channel->sigma_a_per_mm,
-                      "sigma_a_ci95", channel->sigma_a_ci95[0], channel->sigma_a_ci95[1],
-                      "sigma_s_prime_per_mm", channel->sigma_s_prime_per_mm, "sigma_s_prime_ci95",
-                      channel->sigma_s_prime_ci95[0], channel->sigma_s_prime_ci95[1], "identifiable",
-                      channel->is_identifiable, "note", channel->note);
-        if (!entry || json_array_append_new(channels, entry) != 0) {
-            json_decref(channels);
-            channels = NULL;
-        }
-    }
-    return channels
-               ? json_pack("{s:b, s:f, s:o, s:f}", "converged", job->result.has_converged, "rms_residual",
-                           job->result.rms_residual, "channels", channels, "seconds", job->seconds)
-               : NULL;
-}
-
-static bool job_write(const struct options *options, struct job *job, dipole_status *status)
-{
-    char name[sizeof job->material.name + 16];
-    snprintf(name, sizeof name, "%s, fitted", job->material.name);
-    snprintf(job->material.name, sizeof job->material.name, "%.*s", (int)sizeof job->material.name - 1,
-             name);
-    snprintf(job->material.source, sizeof job->material.source,
-             "recovered from a picture by fit, libdipole %s", dipole_version());
-    json_t *block = fit_block(job);
-    const bool done = block ? io_material_write(options->material_path, &job->material, block, status)
-                            : dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the result");
-    json_decref(block);
-    return done;
-}
-
-static bool print_json(const struct job *job, dipole_status *status)
-{
-    json_t *block = fit_block(job);
-    char *text = block ? io_json_format(block) : NULL;
-    json_decref(block);
-    if (!text)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the result");
-    fputs(text, stdout);
-    free(text);
-    return true;
-}
-
-static void print_table(const struct job *job)
-{
-    const struct fit_picture_result *result = &job->result;
-    printf("channel     sigma_a                  95 %%    sigma_s'                  95 %%\n");
-    printf("               1/mm                  1/mm        1/mm                  1/mm\n");
-    for (int c = 0; c < FIT_CHANNEL_COUNT; c++) {
-        const struct fit_estimate *channel = &result->channels[c];
-        char intervals[2][32];
-        snprintf(intervals[0], sizeof intervals[0], "[%.4g, %.4g]", channel->sigma_a_ci95[0],
-                 channel->sigma_a_ci95[1]);
-        snprintf(intervals[1], sizeof intervals[1], "[%.4g, %.4g]", channel->sigma_s_prime_ci95[0],
-                 channel->sigma_s_prime_ci95[1]);
-        printf("%-7s %11.4g  %20s  %10.4g  %20s\n", io_channel_names[c], channel->sigma_a_per_mm,
-               intervals[0], channel->sigma_s_prime_per_mm, intervals[1]);
-    }
-    for (int c = 0; c < FIT_CHANNEL_COUNT; c++) {
-        if (result->channels[c].note[0])
-            printf("%s: %s\n", io_channel_names[c], result->channels[c].note);
-    }
-    printf("rms residual %.2g %%; %zu of %zu pixels, %zu light samples %.3g mm apart, %d round%s, %.1f s\n",
-           100.0 * result->rms_residual, result->pixel_count, result->usable_pixel_count,
-           result->sample_count, result->spacing_mm, result->round_count,
-           result->round_count == 1 ? "" : "s", job->seconds);
-}
-
-static bool job_print(const struct options *options, const struct job *job, dipole_status *status)
-{
-    if (options->common.json) {
-        if (!print_json(job, status))
-            return false;
-    } else {
-        print_table(job);
-    }
-    return cli_stdout_finish(status);
-}
-
-static bool run(const struct cli_tool *tool, const struct options *options, dipole_status *status)
-{
-    struct job job = { 0 };
-    bool done = job_read(tool, options, &job, status) && job_fit(tool, options, &job, status) &&
-                job_write(options, &job, status) && job_print(options, &job, status);
+    struct fit_job job;
+    if (signal(SIGINT, handle_interrupt) == SIG_IGN)
+        signal(SIGINT, SIG_IGN); /* as a row of a batch, which is ended by another signal */
+    bool done = fit_job_read(tool, options, &job, status);
+    done = done && fit_job_run(&job, &stop, status) && fit_job_write(&job, status);
     if (done && !job.result.has_converged) {
-        const dipole_place place = { .source = options->picture_path };
-        done = dipole_fail(status, DIPOLE_NOT_CONVERGED, &place,
-                           "the fit did not converge; %s says where it stopped", options->material_path);
+        const dipole_place place = { .source = options->photo_paths.count > 0
+                                                   ? options->photo_paths.values[0]
+                                                   : options->material_path };
+        done = dipole_fail(status, DIPOLE_NOT_CONVERGED, &place, "the fit %s; %s has the best so far",
+                           job.result.is_interrupted ? "was interrupted" : "did not converge",
+                           options->material_path);
     }
-    io_image_destroy(job.picture);
-    io_scene_destroy(job.scene);
+    fit_job_destroy(&job);
     return done;
+}
+
+/* What of the options contradicts itself; NULL: nothing. */
+static const char *refusal_of(const struct fit_job_options *options, int operand_count)
+{
+    const size_t pair_count = (size_t)operand_count / 2;
+    const size_t other_count = options->profile_paths.count + options->totals_paths.count;
+    const bool has_target = operand_count > 0 || other_count > 0;
+    const struct {
+        bool is_wrong;
+        const char *text;
+    } rules[] = {
+        { operand_count % 2 != 0, "expected SCENE.json and TARGET in pairs" },
+        { !has_target, "no target was given: SCENE.json TARGET, --profile or --totals" },
+        { !options->material_path, "no --output (-o) MATERIAL.json was given" },
+        { pair_count + other_count > FIT_TARGET_LIMIT, "expected at most 16 targets" },
+        { options->mask_paths.count > pair_count, "expected at most one --mask for each TARGET" },
+        { options->camera_names.count > 1 && options->camera_names.count != pair_count,
+          "expected one --camera, or one for each TARGET" },
+        { pair_count == 0 && !(options->eta > 0) && !options->start_path,
+          "nothing says what eta is: expected --eta or --start" },
+        { pair_count > 0 && options->eta > 0,
+          "--eta cannot be used with a scene, whose material states it" },
+        { pair_count > 0 && options->profile_paths.count % FIT_CHANNEL_COUNT != 0,
+          "expected a --profile for each of red, green and blue beside pictures" },
+        { pair_count == 0 && options->profile_paths.count > 1 &&
+              options->profile_paths.count % FIT_CHANNEL_COUNT != 0,
+          "expected one --profile, or one for each of red, green and blue" },
+    };
+    for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
+        if (rules[i].is_wrong)
+            return rules[i].text;
+    }
+    return NULL;
 }
 
 int main(int argc, char **argv)
 {
-    struct options options = { 0 };
+    struct fit_job_options options = { .model = -1 };
+    struct fit_batch_request batch = { 0 };
     const struct cli_option table[] = {
         { .name = "output",
           .letter = 'o',
           .kind = CLI_TEXT,
           .target = &options.material_path,
           .argument = "MATERIAL.json",
-          .help = "File to write the material to (required)." },
+          .help = "File to write the material to (required); with --batch the folder for all of them." },
+        { .name = "profile",
+          .kind = CLI_TEXTS,
+          .target = &options.profile_paths,
+          .argument = "R.csv",
+          .help =
+              "Fit a radial profile: columns r_mm or r_lo_mm,r_hi_mm, then rd_per_mm2 (per light that "
+              "entered) or R_per_mm2 (that arrives), perhaps sem; given three times: red, green, blue." },
+        { .name = "totals",
+          .kind = CLI_TEXTS,
+          .target = &options.totals_paths,
+          .argument = "TOTALS.csv",
+          .help =
+              "Fit what slabs reflect and let through in all: columns thickness_mm, and total_ or diffuse_ "
+              "reflectance and transmittance." },
+        { .name = "eta",
+          .kind = CLI_NUMBER,
+          .target = &options.eta,
+          .argument = "ETA",
+          .min = DIPOLE_ETA_MIN,
+          .max = DIPOLE_ETA_MAX,
+          .help = "Index of refraction inside over outside, where no scene says it." },
+        { .name = "model",
+          .kind = CLI_CHOICE,
+          .target = &options.model,
+          .argument = "MODEL",
+          .choices = io_model_names,
+          .help = "How light spreads under the surface (default: what a picture by render was drawn with, "
+                  "else what the scene's or the start's material states; else modes for totals alone, else "
+                  "beam "
+                  "unless modes or dipole fit clearly better)." },
         { .name = "start",
           .kind = CLI_TEXT,
           .target = &options.start_path,
           .argument = "MATERIAL.json",
-          .help = "Begin the search at the coefficients of this material, a file or a bundled name such as "
+          .help = "Begin the search at these coefficients of the sought layer, a file or a bundled name "
+                  "such as "
                   "skin1 (default: the scene's)." },
+        { .name = "free",
+          .kind = CLI_CHOICES,
+          .target = &options.free,
+          .argument = "WHAT,...",
+          .choices = fit_free_names,
+          .help = "Fit these too: exposure (a factor for each picture and profile), white-balance (red and "
+                  "blue "
+                  "of all pictures), ambient (light from all around), "
+                  "black-level (default: nothing)." },
+        { .name = "mask",
+          .kind = CLI_TEXTS,
+          .target = &options.mask_paths,
+          .argument = "PICTURE",
+          .help =
+              "Fit only where this picture is brighter than half, code 128 of 255; one for each TARGET, in "
+              "order." },
+        { .name = "linear",
+          .kind = CLI_FLAG,
+          .target = &options.is_linear,
+          .help = "Integers in pictures are proportional to light (default: they are sRGB)." },
+        { .name = "camera",
+          .kind = CLI_TEXTS,
+          .target = &options.camera_names,
+          .argument = "NAME",
+          .help = "Which of the scene's cameras took the picture; one for all, or one for each TARGET." },
+        { .name = "layer",
+          .kind = CLI_NUMBER,
+          .target = &options.layer,
+          .argument = "N",
+          .min = 1,
+          .max = DIPOLE_LAYER_LIMIT,
+          .help = "Which layer is sought, from the top (default: 1)." },
+        { .name = "known-thickness",
+          .kind = CLI_FLAG,
+          .target = &options.is_thickness_known,
+          .help = "Do not seek the layer's thickness: it is what the material says." },
+        { .name = "report",
+          .kind = CLI_TEXT,
+          .target = &options.report_path,
+          .argument = "DIR",
+          .help = "Write a page about the fit into this folder: pictures, differences, masks, profiles." },
+        { .name = FIT_BATCH_OPTION,
+          .kind = CLI_TEXT,
+          .target = &batch.list_path,
+          .argument = "LIST.csv",
+          .help = "Do all the fits of a list, a row each; see below." },
+        { .name = FIT_BATCH_SHARD_OPTION,
+          .kind = CLI_TEXT,
+          .target = &batch.shard,
+          .argument = "I/N",
+          .help = "Do only the rows of a batch that belong to part I of N." },
+        { .name = FIT_BATCH_ROW_SECONDS_OPTION,
+          .kind = CLI_NUMBER,
+          .target = &batch.row_seconds,
+          .argument = "S",
+          .min = 0.001,
+          .max = 1e9,
+          .help = "End a row of a batch that takes longer than this, in s (default: no limit)." },
         { .name = "allow-path",
           .kind = CLI_TEXTS,
           .target = &options.allowed_paths,
@@ -236,13 +198,16 @@ int main(int argc, char **argv)
         { .name = NULL },
     };
     const struct cli_tool tool = { .name = "fit",
-                                   .summary = "recover a material's scattering coefficients from a picture",
-                                   .usage =
-                                       "SCENE.json TARGET.exr -o MATERIAL.json [--start MATERIAL.json]",
+                                   .summary = "recover a material's scattering coefficients from pictures "
+                                              "of it, or from its profile",
+                                   .usage = "SCENE.json TARGET [SCENE.json TARGET ...] -o MATERIAL.json\n"
+                                            "--profile R.csv --eta ETA -o MATERIAL.json\n"
+                                            "--totals TOTALS.csv --eta ETA -o MATERIAL.json\n"
+                                            "--batch LIST.csv -o FOLDER [--shard I/N]",
                                    .details = details,
                                    .options = table,
-                                   .operand_min = 2,
-                                   .operand_max = 2 };
+                                   .operand_min = 0,
+                                   .operand_max = 2 * FIT_TARGET_LIMIT };
     char **operands;
     int operand_count;
     cli_start();
@@ -250,13 +215,19 @@ int main(int argc, char **argv)
         cli_parse(&tool, argc, argv, &options.common, &operands, &operand_count);
     if (outcome != CLI_RUN)
         return outcome == CLI_STOP_DONE ? EXIT_DONE : EXIT_USAGE;
-    options.scene_path = operands[0];
-    options.picture_path = operands[1];
+    if (fit_batch_is_asked(&batch)) {
+        batch.folder = options.material_path;
+        return fit_batch_run(&tool, &options.common, argc, argv, &batch);
+    }
     dipole_status status = { 0 };
-    if (!options.material_path) {
-        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL,
-                    "no --output (-o) MATERIAL.json was given; try --help");
+    const char *const refusal = refusal_of(&options, operand_count);
+    if (refusal) {
+        dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "%s; try --help", refusal);
         return cli_report(&tool, &status, EXIT_USAGE);
+    }
+    for (int i = 0; i + 1 < operand_count; i += 2) {
+        options.scene_paths.values[options.scene_paths.count++] = operands[i];
+        options.photo_paths.values[options.photo_paths.count++] = operands[i + 1];
     }
     return run(&tool, &options, &status) ? EXIT_DONE : cli_report(&tool, &status, EXIT_FAILED);
 }

@@ -1,13 +1,14 @@
 #include "fit/operator.h"
 
+#include "fit/clusters.h"
+#include "lutgen/parallel.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <threads.h>
-#include <unistd.h>
 
 /*
  * Distances are sorted by y = 1 + (r/s)^2 on an axis that is linear within each octave of y and doubles its
@@ -30,7 +31,7 @@ enum {
     FRACTION_BITS = MANTISSA_BITS - BIN_BITS,
     BLOCK_PAIRS = 512, /* pairs whose bins are found together: fits the first cache            */
     BLOCK_PIXELS = 32, /* pixels a thread takes at a time                                       */
-    THREAD_LIMIT = 64,
+    PROGRESS_STEPS = 20,
 };
 static const uint32_t bits_of_one = 0x3f800000u;
 
@@ -39,13 +40,6 @@ static double axis_y(size_t index, size_t per_octave)
     const size_t octave = index / per_octave;
     return ldexp(1.0 + (double)(index % per_octave) / (double)per_octave, (int)octave);
 }
-
-/* Samples by component, so that distances to one pixel are found several at a time. */
-struct flat_samples {
-    size_t count, set_count;
-    float *x, *y, *z;
-    float *flux[FIT_CHANNEL_COUNT];
-};
 
 /* Profile at bin j from nodes first[j] .. first[j] + STENCIL - 1. */
 struct stencil {
@@ -56,13 +50,16 @@ struct stencil {
 struct build {
     const struct fit_geometry *geometry;
     struct fit_operator *op;
-    struct flat_samples samples;
+    struct fit_clusters **clusters; /* of each object, or one of all      */
+    int object_count;
+    uint32_t *order;          /* of pixels, along a curve through space           */
+    int base;                 /* the channel of a single set                      */
     struct stencil *stencils; /* bin_count                                        */
     size_t bin_count;
-    double *bins; /* per thread: set_count x 2 x bin_count            */
-    size_t bins_per_thread;
+    size_t bin_value_count; /* set_count x 2 x bin_count                      */
+    size_t first_block;     /* of those under way                             */
     float inverse_scale2_per_mm2, cut_y;
-    atomic_size_t next_pixel, next_thread;
+    atomic_bool is_out_of_memory;
     const struct fit_progress *progress;
 };
 
@@ -91,27 +88,28 @@ static void stencil_init(struct stencil *stencil, double y, size_t node_count)
 
 /* Share the flux of every sample between the bins of its distance. Bins hold, per set, the sums of flux
  * and of flux times fraction: two independent sums where hat functions would need four steps. */
-static void bin_pixel(const struct build *build, const float position_mm[3], double *bins)
+static void bin_pixel(const struct build *build, const struct fit_points *points,
+                      const float position_mm[3], double *bins)
 {
-    const struct flat_samples *samples = &build->samples;
-    memset(bins, 0, build->bins_per_thread * sizeof *bins);
-    for (size_t start = 0; start < samples->count; start += BLOCK_PAIRS) {
-        const size_t rest = samples->count - start;
+    const size_t set_count = build->op->set_count;
+    memset(bins, 0, build->bin_value_count * sizeof *bins);
+    for (size_t start = 0; start < points->count; start += BLOCK_PAIRS) {
+        const size_t rest = points->count - start;
         const size_t count = rest < BLOCK_PAIRS ? rest : BLOCK_PAIRS;
         uint32_t bits[BLOCK_PAIRS];
         for (size_t i = 0; i < count; i++) {
-            const float dx = samples->x[start + i] - position_mm[0];
-            const float dy = samples->y[start + i] - position_mm[1];
-            const float dz = samples->z[start + i] - position_mm[2];
+            const float dx = points->x[start + i] - position_mm[0];
+            const float dy = points->y[start + i] - position_mm[1];
+            const float dz = points->z[start + i] - position_mm[2];
             const float y = 1.0f + (dx * dx + dy * dy + dz * dz) * build->inverse_scale2_per_mm2;
-            /* what was cut is put into bin 0 with no flux by the loop below; y = 0 marks it */
+            /* y = 0 marks what was cut, which the loop below leaves out */
             const float kept = y <= build->cut_y ? y : 0.0f;
             memcpy(&bits[i], &kept, sizeof kept);
         }
-        for (size_t set = 0; set < samples->set_count; set++) {
+        for (size_t set = 0; set < set_count; set++) {
             double *restrict sum = bins + set * 2 * build->bin_count;
             double *restrict moment = sum + build->bin_count;
-            const float *flux = samples->flux[set] + start;
+            const float *flux = points->flux_w[set_count == 1 ? (size_t)build->base : set] + start;
             for (size_t i = 0; i < count; i++) {
                 if (bits[i] == 0)
                     continue;
@@ -140,39 +138,46 @@ static void row_from_bins(const struct build *build, const double *bins, double 
     }
 }
 
-/* Take blocks of pixels until none is left. Every row has one writer, so threads change no bit. */
-static int build_rows(void *argument)
+/* The rows of one block of pixels. Every row has one writer, so threads change no bit. */
+static void build_block(void *context, int index)
 {
-    struct build *build = argument;
-    struct fit_operator *op = build->op;
-    const size_t thread = atomic_fetch_add(&build->next_thread, 1);
-    double *bins = build->bins + thread * build->bins_per_thread;
-    for (;;) {
-        const size_t first = atomic_fetch_add(&build->next_pixel, BLOCK_PIXELS);
-        if (first >= op->pixel_count)
-            return 0;
-        const size_t end = first + BLOCK_PIXELS < op->pixel_count ? first + BLOCK_PIXELS : op->pixel_count;
-        for (size_t j = first; j < end; j++) {
-            bin_pixel(build, build->geometry->positions_mm + 3 * j, bins);
-            for (size_t set = 0; set < op->set_count; set++)
-                row_from_bins(build, bins + set * 2 * build->bin_count,
-                              op->rows + (set * op->pixel_count + j) * op->node_count);
-        }
-        if (thread == 0 && build->progress && build->progress->show)
-            build->progress->show(build->progress->context, "building the operator",
-                                  (double)end / (double)op->pixel_count);
+    struct build *const build = context;
+    struct fit_operator *const op = build->op;
+    struct fit_points points = { 0 };
+    const size_t first = ((size_t)index + build->first_block) * BLOCK_PIXELS;
+    const size_t end = first + BLOCK_PIXELS < op->pixel_count ? first + BLOCK_PIXELS : op->pixel_count;
+    double *const bins = malloc(build->bin_value_count * sizeof *bins);
+    bool done = bins != NULL;
+    for (size_t j = first; done && j < end; j++) {
+        const float *const position_mm = build->geometry->positions_mm + 3 * j;
+        const int object = build->geometry->objects ? build->geometry->objects[j] : 0;
+        done = fit_clusters_collect(build->clusters[object], position_mm, &points);
+        if (!done)
+            break;
+        bin_pixel(build, &points, position_mm, bins);
+        for (size_t set = 0; set < op->set_count; set++)
+            row_from_bins(build, bins + set * 2 * build->bin_count,
+                          op->rows + (set * op->pixel_count + j) * op->node_count);
     }
+    if (!done)
+        atomic_store(&build->is_out_of_memory, true);
+    free(bins);
+    fit_points_destroy(&points);
 }
 
-static void build_run(struct build *build, size_t thread_count)
+/* All blocks, some at a time, so that progress is shown by the calling thread. */
+static void build_rows(struct build *build)
 {
-    thrd_t threads[THREAD_LIMIT];
-    size_t started = 0;
-    while (started + 1 < thread_count && thrd_create(&threads[started], build_rows, build) == thrd_success)
-        started++;
-    (void)build_rows(build);
-    for (size_t i = 0; i < started; i++)
-        thrd_join(threads[i], NULL);
+    const size_t block_count = (build->op->pixel_count + BLOCK_PIXELS - 1) / BLOCK_PIXELS;
+    const size_t step = block_count / PROGRESS_STEPS + 1;
+    for (size_t first = 0; first < block_count; first += step) {
+        const size_t rest = block_count - first;
+        build->first_block = first;
+        if (build->progress && build->progress->show)
+            build->progress->show(build->progress->context, "building the operator",
+                                  (double)first / (double)block_count);
+        lut_parallel_for((int)(rest < step ? rest : step), 0, build_block, build);
+    }
 }
 
 /* Twice the diagonal of the box around everything would do; the diagonal itself is the bound. */
@@ -221,35 +226,6 @@ static bool is_one_colour(const struct fit_geometry *geometry, int base,
     return true;
 }
 
-static size_t processor_count(void)
-{
-    const long count = sysconf(_SC_NPROCESSORS_ONLN);
-    return count < 1 ? 1 : count > THREAD_LIMIT ? THREAD_LIMIT : (size_t)count;
-}
-
-static bool samples_flatten(const struct fit_geometry *geometry, int base, size_t set_count,
-                            struct flat_samples *out)
-{
-    const size_t count = geometry->sample_count;
-    float *memory = malloc((count + 1) * (3 + set_count) * sizeof *memory);
-    if (!memory)
-        return false;
-    *out = (struct flat_samples){
-        .count = count, .set_count = set_count, .x = memory, .y = memory + count, .z = memory + 2 * count
-    };
-    for (size_t set = 0; set < set_count; set++)
-        out->flux[set] = memory + (3 + set) * count;
-    for (size_t i = 0; i < count; i++) {
-        const struct render_light_sample *sample = &geometry->samples[i];
-        out->x[i] = sample->position_mm[0];
-        out->y[i] = sample->position_mm[1];
-        out->z[i] = sample->position_mm[2];
-        for (size_t set = 0; set < set_count; set++)
-            out->flux[set][i] = sample->flux_w[set_count == 1 ? (size_t)base : set];
-    }
-    return true;
-}
-
 static bool operator_allocate(size_t pixel_count, size_t node_count, size_t set_count,
                               struct fit_operator **operator_out)
 {
@@ -269,6 +245,22 @@ static bool operator_allocate(size_t pixel_count, size_t node_count, size_t set_
     return true;
 }
 
+/* One tree for each object that pixels show, so that light stays in the object that it entered. */
+static bool create_clusters(struct build *build)
+{
+    const struct fit_geometry *const geometry = build->geometry;
+    build->object_count = 1;
+    for (size_t j = 0; geometry->objects && j < geometry->pixel_count; j++)
+        build->object_count =
+            geometry->objects[j] >= build->object_count ? geometry->objects[j] + 1 : build->object_count;
+    build->clusters = calloc((size_t)build->object_count, sizeof(struct fit_clusters *));
+    bool done = build->clusters != NULL;
+    for (int object = 0; done && object < build->object_count; object++)
+        done = fit_clusters_create(geometry->samples, geometry->sample_count,
+                                   geometry->objects ? object : -1, &build->clusters[object], NULL);
+    return done;
+}
+
 bool fit_operator_create(const struct fit_geometry *geometry, const struct fit_progress *progress,
                          struct fit_operator **operator_out, dipole_status *status)
 {
@@ -277,34 +269,34 @@ bool fit_operator_create(const struct fit_geometry *geometry, const struct fit_p
     /* Below s the axis is linear in r^2: a third of the shortest mean free path leaves the bend of R_d,
      * at r = z_r, to the logarithmic part. */
     const double scale_mm = geometry->finest_mm / 3.0;
-    const double largest_y = 1.0 + pow(largest_distance_mm(geometry) / scale_mm, 2.0);
+    /* the points of a cluster lie up to sqrt(3) of its radius from its mean, a quarter farther than samples
+     */
+    const double largest_mm = 1.25 * largest_distance_mm(geometry);
+    const double largest_y = 1.0 + pow(largest_mm / scale_mm, 2.0);
     if (!(largest_y < ldexp(1.0, OCTAVE_LIMIT - 1)))
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
                            "positions span %g mm, expected less than %g mm at a mean free path of %g mm",
-                           largest_distance_mm(geometry), scale_mm * ldexp(1.0, OCTAVE_LIMIT / 2 - 1),
-                           geometry->finest_mm);
+                           largest_mm, scale_mm * ldexp(1.0, OCTAVE_LIMIT / 2 - 1), geometry->finest_mm);
     /* one part in 1e5 above the bound, for distances rounded up in float */
     const size_t octave_count = (size_t)ilogb(largest_y * 1.00001) + 1;
 
     double colour[FIT_CHANNEL_COUNT];
     const int base = brightest_channel(geometry, colour);
     const size_t set_count = is_one_colour(geometry, base, colour) ? 1 : FIT_CHANNEL_COUNT;
-    const size_t thread_count = processor_count();
     const double cut_y = 1.0 + pow(geometry->cut_mm / scale_mm, 2.0);
     struct build build = {
         .geometry = geometry,
         .bin_count = octave_count * BINS_PER_OCTAVE + 1,
         .inverse_scale2_per_mm2 = (float)(1.0 / (scale_mm * scale_mm)),
         .cut_y = (float)fmin(cut_y, 1e38),
+        .base = base,
         .progress = progress,
     };
-    build.bins_per_thread = set_count * 2 * build.bin_count;
-    const bool is_allocated =
-        operator_allocate(geometry->pixel_count, octave_count * NODES_PER_OCTAVE + 1, set_count,
-                          &build.op) &&
-        samples_flatten(geometry, base, set_count, &build.samples) &&
-        (build.stencils = malloc(build.bin_count * sizeof *build.stencils)) &&
-        (build.bins = malloc(thread_count * build.bins_per_thread * sizeof *build.bins));
+    build.bin_value_count = set_count * 2 * build.bin_count;
+    const bool is_allocated = operator_allocate(geometry->pixel_count, octave_count * NODES_PER_OCTAVE + 1,
+                                                set_count, &build.op) &&
+                              create_clusters(&build) &&
+                              (build.stencils = malloc(build.bin_count * sizeof *build.stencils));
     if (is_allocated) {
         struct fit_operator *op = build.op;
         for (int c = 0; c < FIT_CHANNEL_COUNT; c++)
@@ -313,12 +305,13 @@ bool fit_operator_create(const struct fit_geometry *geometry, const struct fit_p
             op->node_r_mm[k] = scale_mm * sqrt(axis_y(k, NODES_PER_OCTAVE) - 1.0);
         for (size_t j = 0; j < build.bin_count; j++)
             stencil_init(&build.stencils[j], axis_y(j, BINS_PER_OCTAVE), op->node_count);
-        build_run(&build, thread_count);
+        build_rows(&build);
     }
-    free(build.samples.x);
+    for (int object = 0; build.clusters && object < build.object_count; object++)
+        fit_clusters_destroy(build.clusters[object]);
+    free(build.clusters);
     free(build.stencils);
-    free(build.bins);
-    if (!is_allocated) {
+    if (!is_allocated || build.is_out_of_memory) {
         free(build.op);
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the operator of %zu pixels",
                            geometry->pixel_count);

@@ -6,9 +6,8 @@
 #ifndef FIT_OPERATOR_H
 #define FIT_OPERATOR_H
 
+#include "fit/form.h"
 #include "renderer/light_samples.h"
-
-enum { FIT_CHANNEL_COUNT = 3 };
 
 /*
  * H, by rows. The nodes r_k lie evenly on the logarithm of r^2 + s^2, from 0 to beyond the largest
@@ -25,6 +24,7 @@ struct fit_operator {
 /* What is drawn from where; nothing is kept. */
 struct fit_geometry {
     const float *positions_mm; /* of pixels, pixel_count x 3, finite              */
+    const int *objects;        /* of pixels: only light samples of the same object count; NULL: all do */
     size_t pixel_count;
     const struct render_light_sample *samples;
     size_t sample_count;

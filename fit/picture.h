@@ -1,37 +1,58 @@
-/* Six coefficients from a picture of a scene: what `fit` does between reading and writing files. */
+/* A picture of a scene as a target: the radiance of its pixels is linear in the profile. theory.md T16,
+ * T38. */
 #ifndef FIT_PICTURE_H
 #define FIT_PICTURE_H
 
-#include "fit/estimate.h"
-#include "io/exr.h"
+#include "fit/operator.h"
+#include "fit/pixels.h"
 #include "io/scene_file.h"
 
 struct fit_picture_request {
-    const struct io_scene *scene;   /* of one medium: eta and fdr_kind are its, its sigmas are not used   */
-    const struct io_image *picture; /* linear radiance, the camera's size, 3 or 4 channels                */
-    const char *picture_path;       /* for messages                                                       */
-    const dipole_medium *start;     /* IO_CHANNEL_COUNT, of which the sigmas are used                     */
-    struct fit_progress progress;
+    const struct io_scene *scene; /* of one material                                                   */
+    const struct fit_photo *photo;
+    const char *photo_path;      /* for messages                                                       */
+    const struct io_image *mask; /* NULL: none                                                         */
+    bool is_gain_free, is_ambient_free, is_black_free;
+    size_t pixel_limit; /* 0: FIT_PIXEL_LIMIT                                                 */
 };
+#define FIT_PIXEL_LIMIT ((size_t)12000)
 
-struct fit_picture_result {
-    struct fit_estimate channels[FIT_CHANNEL_COUNT];
-    bool has_converged;
-    double rms_residual; /* over all channels, see struct fit_estimate                              */
-    double scale_error, tile_error; /* relative, taken into the intervals                                 */
-    double spacing_mm; /* of the light samples at the end                                         */
-    size_t sample_count, pixel_count, usable_pixel_count;
-    int round_count;
-    char note[256]; /* a promise that could not be kept, or ""                                 */
-};
+/* Must outlive the targets it makes. */
+struct fit_picture;
+
+/* Get a renderer for the scene. The request, and what it names, must outlive the picture. Fails with
+ * DIPOLE_BAD_VALUE (sizes that differ), or as render_create does. */
+DIPOLE_CHECKED bool fit_picture_create(const struct fit_picture_request *request,
+                                       struct fit_picture **picture_out, dipole_status *status);
+void fit_picture_destroy(struct fit_picture *picture);
 
 /*
- * Draw what the scene's light and view say about the picture, fit, and draw again with light samples as
- * close as the coefficients found need them, until that changes nothing.
- * Not converging is an answer. Fails with what render_create, render_capture_create, fit_pixels_create and
- * fit_operator_create fail with, or DIPOLE_BAD_VALUE (size or channels of the picture).
+ * Draw what light and view say, choose pixels, and make the target, with as many light samples as a first
+ * look takes, or as close as fit_picture_is_fine() last found that they should be. Its rows stay the
+ * picture's. Fails with what render_capture_create, fit_pixels_create and fit_operator_create fail with, or
+ * DIPOLE_BAD_VALUE (no light).
  */
-DIPOLE_CHECKED bool fit_picture(const struct fit_picture_request *request,
-                                struct fit_picture_result *result_out, dipole_status *status);
+DIPOLE_CHECKED bool fit_picture_prepare(struct fit_picture *picture, const struct fit_progress *progress,
+                                        struct fit_target *target_out, dipole_status *status);
+
+/*
+ * Whether light samples are as close as the coefficients found need them; if not, the next
+ * fit_picture_prepare takes closer ones. Where so many cannot be had the answer is true, and note says how
+ * much that costs.
+ *
+ *   stacks  of the channels that can be trusted; NULL for the others
+ *   target  of the last fit_picture_prepare; its systematic errors get what sampling adds
+ */
+bool fit_picture_is_fine(struct fit_picture *picture, dipole_stack *const stacks[FIT_CHANNEL_COUNT],
+                         struct fit_target *target, char *note, size_t note_size);
+
+/* Call pixels outliers where a channel of the target, as fit_picture_prepare made it, was given no weight.
+ */
+void fit_picture_mark_outliers(struct fit_picture *picture, const struct fit_target *target);
+
+/* Of the last fit_picture_prepare. */
+const struct fit_pixels *fit_picture_pixels(const struct fit_picture *picture);
+const struct render_capture *fit_picture_capture(const struct fit_picture *picture);
+double fit_picture_spacing_mm(const struct fit_picture *picture);
 
 #endif

@@ -42,6 +42,26 @@ void silence()
 
 using row_matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// Notes the course of a search, and ends it when asked to.
+class observer : public ceres::IterationCallback
+{
+  public:
+    observer(const fit_least_squares &problem, fit_minimum *out) : problem_(problem), out_(out)
+    {
+    }
+
+    ceres::CallbackReturnType operator()(const ceres::IterationSummary &summary) override
+    {
+        if (out_->history_count < FIT_HISTORY_LIMIT)
+            out_->history[out_->history_count++] = 2.0 * summary.cost;
+        return problem_.stop && *problem_.stop ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+    }
+
+  private:
+    const fit_least_squares &problem_;
+    fit_minimum *out_;
+};
+
 void solve(const fit_least_squares &least_squares, const double *start, fit_minimum *out)
 {
     const std::size_t parameter_count = least_squares.parameter_count;
@@ -57,11 +77,25 @@ void solve(const fit_least_squares &least_squares, const double *start, fit_mini
         problem.SetParameterUpperBound(out->parameters, static_cast<int>(i), least_squares.upper[i]);
     }
 
+    std::vector<int> held;
+    for (std::size_t i = 0; i < parameter_count; i++) {
+        if (least_squares.is_held[i])
+            held.push_back(static_cast<int>(i));
+    }
+    if (held.size() == parameter_count)
+        problem.SetParameterBlockConstant(out->parameters);
+    else if (!held.empty())
+        problem.SetManifold(out->parameters,
+                            new ceres::SubsetManifold(static_cast<int>(parameter_count), held));
+
+    out->history_count = 0;
+    observer watching(least_squares, out);
     ceres::Solver::Options options;
+    options.callbacks.push_back(&watching);
     options.linear_solver_type = ceres::DENSE_QR;
     options.logging_type = ceres::SILENT;
     options.num_threads = 1;
-    options.max_num_iterations = 200;
+    options.max_num_iterations = least_squares.iteration_limit > 0 ? least_squares.iteration_limit : 100;
     options.function_tolerance = 1e-12;
     options.gradient_tolerance = 1e-15;
     options.parameter_tolerance = 1e-10;
@@ -124,6 +158,40 @@ double fit_least_squares_jacobian_error(const fit_least_squares *problem, const 
         return jacobian_error(*problem, parameters);
     } catch (const std::exception &) {
         return std::numeric_limits<double>::infinity();
+    }
+}
+
+bool fit_inverse_information(const double *triangle, size_t count, double rank_tolerance, double *inverse,
+                             double *singular, dipole_status *status)
+{
+    try {
+        const auto n = static_cast<Eigen::Index>(count);
+        Eigen::MatrixXd scaled = Eigen::Map<const row_matrix>(triangle, n, n);
+        Eigen::VectorXd length(n);
+        for (Eigen::Index i = 0; i < n; i++) {
+            length[i] = scaled.col(i).stableNorm();
+            if (length[i] > 0.0)
+                scaled.col(i) /= length[i];
+        }
+        const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeFullU | Eigen::ComputeFullV);
+        const Eigen::VectorXd &values = svd.singularValues();
+        const double least = std::max(rank_tolerance * values[0], std::numeric_limits<double>::min());
+        const Eigen::VectorXd raised = values.cwiseMax(least);
+        const Eigen::MatrixXd turned = svd.matrixV() * raised.cwiseInverse().asDiagonal();
+        Eigen::Map<row_matrix> out(inverse, n, n);
+        out = turned * turned.transpose();
+        for (Eigen::Index i = 0; i < n; i++) {
+            for (Eigen::Index k = 0; k < n; k++) {
+                if (length[i] > 0.0 && length[k] > 0.0)
+                    out(i, k) /= length[i] * length[k];
+                else
+                    out(i, k) = i == k ? std::numeric_limits<double>::infinity() : 0.0;
+            }
+        }
+        std::copy(values.data(), values.data() + n, singular);
+        return true;
+    } catch (const std::bad_alloc &) {
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, nullptr, "no memory for %zu parameters", count);
     }
 }
 

@@ -4,11 +4,13 @@
 
 #include "libdipole/dipole.h"
 
+#include <signal.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { FIT_PARAMETER_LIMIT = 8 };
+enum { FIT_PARAMETER_LIMIT = 128, FIT_HISTORY_LIMIT = 256 };
 
 /* Fill residuals and, unless it is NULL, jacobian (residual_count x parameter_count, by rows: derivative of
  * the residual with respect to the parameter). Returns false where the parameters have no value. */
@@ -22,6 +24,9 @@ struct fit_least_squares {
     size_t residual_count;
     size_t parameter_count; /* at most FIT_PARAMETER_LIMIT */
     double lower[FIT_PARAMETER_LIMIT], upper[FIT_PARAMETER_LIMIT];
+    int iteration_limit;               /* 0: 100                                             */
+    bool is_held[FIT_PARAMETER_LIMIT]; /* stays where it starts                             */
+    const volatile sig_atomic_t *stop; /* not 0: end after this iteration; NULL: never      */
 };
 
 struct fit_minimum {
@@ -29,6 +34,8 @@ struct fit_minimum {
     double sum_of_squares;
     int iteration_count;
     bool has_converged;
+    double history[FIT_HISTORY_LIMIT]; /* sum of squares at the start and after each iteration */
+    int history_count;
 };
 
 /*
@@ -42,6 +49,20 @@ DIPOLE_CHECKED bool fit_least_squares_solve(const struct fit_least_squares *prob
 /* Largest difference between jacobian and Ceres' own numeric derivative at a point, relative to the larger
  * of the two; INFINITY where there is no value. For tests. */
 double fit_least_squares_jacobian_error(const struct fit_least_squares *problem, const double *parameters);
+
+/*
+ * Invert J'J for the triangle J that weighted rows of derivatives were folded into, after a look at its
+ * singular values: columns are scaled to length 1 first, and singular values below rank_tolerance of the
+ * largest are raised to it, so that what the data do not tell comes out as variances as large as they are.
+ *
+ *   triangle  count x count, upper
+ *   inverse   count x count; rows and columns of parameters without any effect are INFINITY on the
+ * diagonal, 0 beside it singular  count values, of the scaled columns, falling; those without effect are 0
+ *
+ * Fails with DIPOLE_OUT_OF_MEMORY.
+ */
+DIPOLE_CHECKED bool fit_inverse_information(const double *triangle, size_t count, double rank_tolerance,
+                                            double *inverse, double *singular, dipole_status *status);
 
 /*
  * Fold rows (row_count x column_count, by rows) into triangle (column_count x column_count, upper, by rows;

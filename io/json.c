@@ -455,8 +455,19 @@ static bool print_string(FILE *out, const char *text)
     return done;
 }
 
+/* Where no lines are broken. */
+enum { ONE_LINE = -1 };
+
+/* A new line of a value that stands at indent, further in by more. */
+static void break_line(FILE *out, int indent, int more)
+{
+    if (indent != ONE_LINE)
+        fprintf(out, "\n%*s", indent + more, "");
+}
+
 static bool print_value(FILE *out, json_t *value, int indent)
 {
+    const int inner = indent == ONE_LINE ? ONE_LINE : indent + 2;
     char number[32];
     switch (json_typeof(value)) {
     case JSON_INTEGER:
@@ -475,19 +486,19 @@ static bool print_value(FILE *out, json_t *value, int indent)
     case JSON_STRING:
         return print_string(out, json_string_value(value));
     case JSON_ARRAY: {
-        const bool is_line = is_flat(value);
+        const bool is_line = indent == ONE_LINE || is_flat(value);
         const size_t count = json_array_size(value);
         fputc('[', out);
         for (size_t i = 0; i < count; i++) {
             if (!is_line)
-                fprintf(out, "\n%*s", indent + 2, "");
-            if (!print_value(out, json_array_get(value, i), indent + 2))
+                break_line(out, indent, 2);
+            if (!print_value(out, json_array_get(value, i), inner))
                 return false;
             if (i + 1 < count)
                 fputs(is_line ? ", " : ",", out);
         }
         if (!is_line)
-            fprintf(out, "\n%*s", indent, "");
+            break_line(out, indent, 0);
         fputc(']', out);
         return true;
     }
@@ -495,16 +506,17 @@ static bool print_value(FILE *out, json_t *value, int indent)
         const char *separator = "";
         fputc('{', out);
         for (void *i = json_object_iter(value); i; i = json_object_iter_next(value, i)) {
-            fprintf(out, "%s\n%*s", separator, indent + 2, "");
+            fputs(separator, out);
+            break_line(out, indent, 2);
             if (!print_string(out, json_object_iter_key(i)))
                 return false;
             fputs(": ", out);
-            if (!print_value(out, json_object_iter_value(i), indent + 2))
+            if (!print_value(out, json_object_iter_value(i), inner))
                 return false;
-            separator = ",";
+            separator = indent == ONE_LINE ? ", " : ",";
         }
         if (json_object_size(value) > 0)
-            fprintf(out, "\n%*s", indent, "");
+            break_line(out, indent, 0);
         fputc('}', out);
         return true;
     }
@@ -512,14 +524,14 @@ static bool print_value(FILE *out, json_t *value, int indent)
     return false;
 }
 
-char *io_json_format(json_t *value)
+static char *format(json_t *value, int indent)
 {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return NULL;
-    bool done = print_value(out, value, 0);
+    bool done = print_value(out, value, indent);
     fputc('\n', out);
     done = !ferror(out) && done;
     if (fclose(out) != 0 || !done) {
@@ -527,4 +539,14 @@ char *io_json_format(json_t *value)
         return NULL;
     }
     return text;
+}
+
+char *io_json_format(json_t *value)
+{
+    return format(value, 0);
+}
+
+char *io_json_format_line(json_t *value)
+{
+    return format(value, ONE_LINE);
 }

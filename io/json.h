@@ -85,4 +85,7 @@ DIPOLE_CHECKED bool io_json_get_choice(const struct io_json *object, const char 
  * digits as give it back; ends with a newline. The caller frees it; NULL without memory. */
 char *io_json_format(json_t *value);
 
+/* The same on one line, which ends with a newline: for files with a value on each line. */
+char *io_json_format_line(json_t *value);
+
 #endif

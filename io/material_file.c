@@ -395,6 +395,7 @@ bool io_material_parse(const struct io_json *at, struct io_material *out, dipole
         !io_json_get_choice(at, "fdr", fdr_names, &fdr_kind, status))
         return false;
     material.model = (dipole_model)model;
+    material.is_model_stated = json_object_get(at->value, "model") != NULL;
     if (!(has_layers ? read_layers : read_homogeneous)(at, (dipole_fdr_kind)fdr_kind, &material, status))
         return false;
     refusal_init(at, &material);

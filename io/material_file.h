@@ -20,6 +20,7 @@ struct io_material {
     char source[512];  /* publication, or ""                        */
     char warning[384]; /* suspicious but legal (a unit slip), or "" */
     dipole_model model;
+    bool is_model_stated; /* by the file, else model is the default         */
     size_t layer_count;
     dipole_layer layers[IO_CHANNEL_COUNT][DIPOLE_LAYER_LIMIT]; /* checked by dipole_stack_create    */
     char layer_names[DIPOLE_LAYER_LIMIT][64];                  /* "epidermis", or ""                */

@@ -12,6 +12,8 @@
 struct io_profile {
     size_t count; /* at least 1 */
     bool has_rings;
+    bool is_per_incident; /* light that arrives, not that enters: the column is R_per_mm2 as in MCML's
+                             tables */
     double *r_lo_mm, *r_hi_mm;
     double *rd_per_mm2;  /* of the size of at most 1e100; noise may have made some negative */
     double *sem_per_mm2; /* standard error, >= 0; NULL when the file has none               */

@@ -56,6 +56,16 @@ void io_scene_scale_to_mm(double v[3], double unit_mm)
 
 /* ---- lights -------------------------------------------------------------------------------------- */
 
+/* How bright a light is; a file that is only fitted to need not know. */
+static bool read_brightness(const struct io_json *at, const char *key, struct io_light *light,
+                            dipole_status *status)
+{
+    light->is_stated = io_json_member(at, key).value != NULL;
+    for (int c = 0; c < 3; c++)
+        light->rgb[c] = 1;
+    return !light->is_stated || io_scene_get_rgb(at, key, light->rgb, status);
+}
+
 static bool read_light(const struct io_json *at, double unit_mm, struct io_light *light,
                        dipole_status *status)
 {
@@ -69,16 +79,16 @@ static bool read_light(const struct io_json *at, double unit_mm, struct io_light
         return false;
     *light = (struct io_light){ .kind = (enum io_light_kind)kind };
     if (kind == IO_LIGHT_POINT) {
-        if (!io_json_check_object(at, point_keys, 3, status) ||
+        if (!io_json_check_object(at, point_keys, 2, status) ||
             !io_scene_get_coordinates(at, "position", light->position_mm, status) ||
-            !io_scene_get_rgb(at, "intensity", light->rgb, status))
+            !read_brightness(at, "intensity", light, status))
             return false;
         io_scene_scale_to_mm(light->position_mm, unit_mm);
         return true;
     }
-    if (!io_json_check_object(at, directional_keys, 3, status) ||
+    if (!io_json_check_object(at, directional_keys, 2, status) ||
         !io_scene_get_coordinates(at, "direction", light->direction, status) ||
-        !io_scene_get_rgb(at, "irradiance", light->rgb, status))
+        !read_brightness(at, "irradiance", light, status))
         return false;
     const struct io_json direction = io_json_member(at, "direction");
     return io_scene_normalize(light->direction) ||

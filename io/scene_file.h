@@ -13,6 +13,7 @@ struct io_light {
     double position_mm[3]; /* point                                                        */
     double rgb[3];         /* directional: irradiance on a facing surface in W/mm^2;
                               point: intensity in W/sr; finite, >= 0                       */
+    bool is_stated;        /* else the file says nothing of rgb, and it is 1               */
 };
 
 struct io_camera {

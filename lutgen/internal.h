@@ -105,12 +105,9 @@ bool lut_check_texels(const struct lut_reader *reader, const float *texels, size
  * that nothing in it was changed without the rest. */
 bool lut_check_same(const struct lut_reader *reader, const struct io_image *expected);
 
-/* ---- hashes (hash.c): FNV-1a, 64 bit ------------------------------------------------------------- */
+/* ---- hashes (hash.c): by io/hash.h ------------------------------------------------------------------- */
 
-#define LUT_HASH_START UINT64_C(0xcbf29ce484222325)
-void lut_hash_bytes(uint64_t *hash, const void *data, size_t size);
-void lut_hash_text(uint64_t *hash, const char *text); /* with its end */
-void lut_hash_number(uint64_t *hash, double value);   /* low byte first on every machine, -0 as 0 */
+void lut_hash_number(uint64_t *hash, double value); /* low byte first on every machine, -0 as 0 */
 void lut_hash_material(uint64_t *hash, const struct io_material *material);
 struct lut_hash lut_hash_print(uint64_t hash);
 

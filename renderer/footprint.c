@@ -115,6 +115,11 @@ static double kernel_over_ring(double r, double s)
     return sum;
 }
 
+double render_footprint_kernel_per_mm2(double blur_mm, double r_mm, double s_mm)
+{
+    return kernel_over_ring(r_mm / blur_mm, s_mm / blur_mm) / (blur_mm * blur_mm);
+}
+
 bool render_footprint_create(const dipole_stack *stack, double blur_mm,
                              struct render_footprint **footprint_out, dipole_status *status)
 {

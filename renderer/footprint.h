@@ -9,6 +9,9 @@
 
 #include "libdipole/dipole.h"
 
+/* The kernel about a point, meaned over a ring of radius s_mm whose centre is r_mm away, in 1/mm^2. */
+double render_footprint_kernel_per_mm2(double blur_mm, double r_mm, double s_mm);
+
 /* Aliasing of samples spacing_mm apart once the profile is blurred: at most, as part of the total. */
 double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, double blur_mm);
 

@@ -227,10 +227,16 @@ static double gap_mm(const struct io_mesh *a, const struct io_mesh *b)
 }
 
 /* Whether light of one object could be taken for another's, or be spread by another's profile. */
-static void tell_objects_apart(const struct io_scene *scene, struct render_plan *plan)
+static void tell_objects_apart(const struct render_request *request, struct render_plan *plan)
 {
+    const struct io_scene *const scene = request->scene;
     plan->ids_reason =
         scene->object_count == 1 ? "one object" : "one medium, objects farther apart than r_max";
+    if (request->is_captured && scene->object_count > 1) {
+        plan->has_object_ids = true;
+        plan->ids_reason = "several objects, of a medium that is not known";
+        return;
+    }
     if (plan->media->count > 1) {
         plan->has_object_ids = true;
         plan->ids_reason = "objects of different media";
@@ -285,7 +291,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
     bool done = read_scene(request, plan, status);
     if (done) {
         render_plan_spend_epsilon(request, plan);
-        tell_objects_apart(request->scene, plan);
+        tell_objects_apart(request, plan);
         choose_technique(request, plan);
         done =
             render_plan_make_views(request, plan, status) && render_plan_make_maps(request, plan, status);

@@ -427,6 +427,11 @@ static void set_attributes(const struct reference *reference)
     char names[512];
     io_image_set_text(image, "dipole:material",
                       render_media_list_names(reference->media, names, sizeof names));
+    if (reference->media->count == 1)
+        io_image_set_text(image, "dipole:model",
+                          io_model_names[reference->media->media[0].material->model]);
+    if (reference->options->is_tone_mapped)
+        io_image_set_number(image, "dipole:linear_limit", RENDER_TONE_KNEE);
     io_image_set_number(image, "dipole:epsilon", reference->report.epsilon);
     io_image_set_number(image, "dipole:error_estimated", reference->report.error_predicted);
     io_image_set_number(image, "dipole:sample_count", (double)reference->report.sample_count);

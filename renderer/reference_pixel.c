@@ -155,7 +155,7 @@ void render_pixel_add_specular(const struct render_pixel_view *view,
 /* tone_map.frag has the same. */
 void render_tone_map(const struct io_scene *scene, float rgba[4])
 {
-    const double knee = 0.6, exposure = exp2(scene->exposure_ev);
+    const double knee = RENDER_TONE_KNEE, exposure = exp2(scene->exposure_ev);
     double colour[3], largest = 0;
     for (int c = 0; c < 3; c++) {
         const double over = (double)rgba[c] + (1 - (double)rgba[3]) * scene->background[c];

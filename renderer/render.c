@@ -159,12 +159,16 @@ static void set_attributes(struct io_image *image, const struct render_plan *pla
     io_image_set_text(image, "dipole:version", dipole_version());
     io_image_set_text(image, "dipole:technique", render_technique_names[plan->technique]);
     io_image_set_text(image, "dipole:material", render_media_list_names(plan->media, names, sizeof names));
+    if (plan->media->count == 1)
+        io_image_set_text(image, "dipole:model", io_model_names[plan->media->media[0].material->model]);
     io_image_set_number(image, "dipole:epsilon", plan->epsilon);
     if (render_plan_reads(plan, "light_samples")) {
         io_image_set_number(image, "dipole:error_predicted", plan->error_predicted);
         io_image_set_number(image, "dipole:r_max_mm", plan->r_max_mm);
         io_image_set_number(image, "dipole:spacing_mm", plan->spacing_mm);
         io_image_set_number(image, "dipole:blur_error", plan->blur_error);
+        if (plan->media->count == 1 && plan->blur_error > 0)
+            io_image_set_numbers(image, "dipole:blur_mm", plan->of_medium[0].blur_mm);
         io_image_set_number(image, "dipole:banding_error", plan->banding_error);
         io_image_set_number(image, "dipole:table_error", plan->table_error);
     }
@@ -198,6 +202,8 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
                              image->pixels, status);
     if (done) {
         set_attributes(image, plan);
+        if (options->is_tone_mapped)
+            io_image_set_number(image, "dipole:linear_limit", RENDER_TONE_KNEE);
         *image_out = image;
     } else {
         io_image_destroy(image);
@@ -221,10 +227,12 @@ static struct render_capture *capture_create(int width_px, int height_px)
     capture->width_px = width_px;
     capture->height_px = height_px;
     capture->position_mm = calloc(pixel_count, 3 * sizeof *capture->position_mm);
+    capture->object = calloc(pixel_count, sizeof *capture->object);
     capture->coverage = calloc(pixel_count, sizeof *capture->coverage);
     capture->exit_per_sr = calloc(pixel_count, sizeof *capture->exit_per_sr);
     capture->specular = calloc(pixel_count, 3 * sizeof *capture->specular);
-    if (capture->position_mm && capture->coverage && capture->exit_per_sr && capture->specular)
+    if (capture->position_mm && capture->object && capture->coverage && capture->exit_per_sr &&
+        capture->specular)
         return capture;
     render_capture_destroy(capture);
     return NULL;
@@ -235,6 +243,7 @@ void render_capture_destroy(struct render_capture *capture)
     if (!capture)
         return;
     free(capture->position_mm);
+    free(capture->object);
     free(capture->coverage);
     free(capture->exit_per_sr);
     free(capture->specular);
@@ -281,6 +290,8 @@ static bool capture_read(struct renderer *renderer, const struct render_plan *pl
     if (!render_executor_read(renderer->executor, "position_mm", rgba, status))
         return false;
     copy_rgb(rgba, pixel_count, capture->position_mm);
+    for (size_t i = 0; i < pixel_count; i++)
+        capture->object[i] = rgba[4 * i + 3];
     if (!render_executor_read(renderer->executor, "capture", rgba, status))
         return false;
     take_parts(rgba, capture);

@@ -38,6 +38,9 @@ extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 #define RENDER_EPSILON_MIN 1e-5
 #define RENDER_EPSILON_MAX 0.5
 
+/* Tone mapping leaves pixels alone whose largest channel is up to this, times 2^exposure_ev. T20 */
+#define RENDER_TONE_KNEE 0.6
+
 /* Largest picture: sides and pixels (a pixel takes about 230 bytes while it is drawn). */
 enum { RENDER_SIDE_LIMIT = 16384 };
 #define RENDER_PIXEL_LIMIT ((size_t)1 << 24)
@@ -168,6 +171,9 @@ DIPOLE_CHECKED bool render_draw(struct renderer *renderer, const struct render_o
 struct render_capture {
     int width_px, height_px;
     float *position_mm;                  /* x 3; 0 where no object is                               */
+    float *object;                       /* number of the object that is seen, from 1; 0: none. Only light
+                                            that entered through the same object comes out: samples have
+                                            object - 1, where the scene has several                 */
     float *coverage;                     /* 0 to 1; 1 only where the equation above holds exactly:
                                             the pixel and its 3 x 3 neighbours are wholly covered, and
                                             the pixel shows a single surface                        */

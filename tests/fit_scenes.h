@@ -10,7 +10,7 @@
 
 struct fit_scene {
     struct fit_geometry geometry;
-    float *positions_mm, *radiosity_w_per_mm2;
+    float *positions_mm;
     struct render_light_sample *samples;
     int *tiles;
 };
@@ -19,11 +19,10 @@ static inline void fit_scene_allocate(struct fit_scene *scene, size_t pixel_coun
 {
     *scene = (struct fit_scene){
         .positions_mm = calloc(3 * pixel_count, sizeof(float)),
-        .radiosity_w_per_mm2 = calloc(3 * pixel_count, sizeof(float)),
         .samples = calloc(sample_count, sizeof(struct render_light_sample)),
         .tiles = calloc(pixel_count, sizeof(int)),
     };
-    assert_true(scene->positions_mm && scene->radiosity_w_per_mm2 && scene->samples && scene->tiles);
+    assert_true(scene->positions_mm && scene->samples && scene->tiles);
     scene->geometry = (struct fit_geometry){ .positions_mm = scene->positions_mm,
                                              .pixel_count = pixel_count,
                                              .samples = scene->samples,
@@ -34,7 +33,6 @@ static inline void fit_scene_allocate(struct fit_scene *scene, size_t pixel_coun
 static inline void fit_scene_free(struct fit_scene *scene)
 {
     free(scene->positions_mm);
-    free(scene->radiosity_w_per_mm2);
     free(scene->samples);
     free(scene->tiles);
 }
@@ -91,16 +89,6 @@ static inline double direct_radiosity(const struct fit_scene *scene,
             sum += (double)sample->flux_w[channel] * dipole_rd_per_mm2(coefficients, r_mm);
     }
     return sum;
-}
-
-/* Draw one channel of the scene's picture in a medium. */
-static inline void fit_scene_draw(struct fit_scene *scene, const dipole_medium *medium, int channel)
-{
-    dipole_coefficients coefficients;
-    assert_true(dipole_coefficients_init(medium, &coefficients, NULL));
-    for (size_t j = 0; j < scene->geometry.pixel_count; j++)
-        scene->radiosity_w_per_mm2[3 * j + (size_t)channel] =
-            (float)direct_radiosity(scene, &coefficients, channel, j);
 }
 
 #endif

@@ -1,5 +1,7 @@
-/* lutgen/hash.c: hashes of materials, of requests and of texels. */
+/* io/hash.c, and lutgen/hash.c: hashes of materials, of requests and of texels. */
 #include "tables.h"
+
+#include "io/hash.h"
 
 static uint64_t hash_of(const struct io_material *material)
 {
@@ -17,8 +19,8 @@ static void bytes_are_hashed_by_fnv(void **state)
                   { "a", UINT64_C(0xaf63dc4c8601ec8c) },
                   { "foobar", UINT64_C(0x85944171f73967e8) } };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        uint64_t hash = LUT_HASH_START;
-        lut_hash_bytes(&hash, cases[i].text, strlen(cases[i].text));
+        uint64_t hash = IO_HASH_START;
+        io_hash_bytes(&hash, cases[i].text, strlen(cases[i].text));
         assert_true(hash == cases[i].hash);
     }
     assert_string_equal(lut_hash_print(0x1f).text, "000000000000001f");

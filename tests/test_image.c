@@ -46,7 +46,7 @@ static void every_code_is_the_nearest(void **state)
                     (float)linear_from_srgb((code + steps[row]) / 255.0);
     }
     assert_true(io_png_write("codes.png", image, &status));
-    assert_true(io_photo_read("codes.png", &found, &status));
+    assert_true(io_photo_read("codes.png", IO_PHOTO_SRGB, NULL, &found, &status));
     assert_int_equal(found->width_px, 256);
     assert_int_equal(found->height_px, 3);
     assert_int_equal(found->channel_count, 3);
@@ -65,7 +65,7 @@ static void values_out_of_range_are_clamped(void **state)
     assert_true(io_image_create(5, 1, 1, &image, NULL));
     memcpy(image->pixels, values, sizeof values);
     assert_true(io_png_write("clamped.png", image, NULL));
-    assert_true(io_photo_read("clamped.png", &found, NULL));
+    assert_true(io_photo_read("clamped.png", IO_PHOTO_SRGB, NULL, &found, NULL));
     assert_int_equal(found->channel_count, 1);
     static const float expected[5] = { 0.0f, 0.0f, 1.0f, 1.0f, 0.0f };
     assert_memory_equal(found->pixels, expected, sizeof expected);
@@ -85,12 +85,30 @@ static void alpha_is_premultiplied_in_memory(void **state)
         memcpy(image->pixels + 4 * i, pixel, sizeof pixel);
     }
     assert_true(io_png_write("alpha.png", image, NULL));
-    assert_true(io_photo_read("alpha.png", &found, NULL));
+    assert_true(io_photo_read("alpha.png", IO_PHOTO_SRGB, NULL, &found, NULL));
     assert_int_equal(found->channel_count, 4);
     for (int i = 0; i < 64; i++)
         assert_true(fabsf(found->pixels[i] - image->pixels[i]) < 0.006f);
     io_image_destroy(image);
     io_image_destroy(found);
+}
+
+/* Oracle: what is written to a file. */
+static void what_is_encoded_is_what_is_written(void **state)
+{
+    (void)state;
+    struct io_image *image = grey_ramp(77);
+    unsigned char *encoded;
+    char *written;
+    size_t encoded_size, written_size;
+    assert_true(io_png_encode(image, &encoded, &encoded_size, NULL));
+    assert_true(io_png_write("encoded.png", image, NULL));
+    read_bytes("encoded.png", &written, &written_size);
+    assert_int_equal(encoded_size, written_size);
+    assert_memory_equal(encoded, written, written_size);
+    free(encoded);
+    free(written);
+    io_image_destroy(image);
 }
 
 /* Oracle: identical pictures make identical files, which tell nothing of when and by what they were made.
@@ -125,7 +143,7 @@ static void an_exr_is_read_without_a_curve(void **state)
     image->pixels[7] = 1234.5f;
     image->pixels[8] = -0.25f;
     assert_true(io_exr_write("linear.exr", image, false, NULL));
-    assert_true(io_photo_read("linear.exr", &found, NULL));
+    assert_true(io_photo_read("linear.exr", IO_PHOTO_SRGB, NULL, &found, NULL));
     assert_memory_equal(found->pixels, image->pixels, 300 * sizeof(float));
     io_image_destroy(image);
     io_image_destroy(found);
@@ -158,7 +176,7 @@ static void sixteen_bits_are_srgb(void **state)
     struct io_image *image;
     dipole_status status;
     assert_true(io_file_write("deep.tif", file, sizeof file, NULL));
-    if (!io_photo_read("deep.tif", &image, &status))
+    if (!io_photo_read("deep.tif", IO_PHOTO_SRGB, NULL, &image, &status))
         fail_msg("%s", status.message);
     assert_int_equal(image->width_px, 2);
     for (int i = 0; i < 6; i++)
@@ -170,7 +188,7 @@ static void expect_unreadable(const char *path, dipole_code code, const char *me
 {
     struct io_image *image;
     dipole_status status = { 0 };
-    assert_false(io_photo_read(path, &image, &status));
+    assert_false(io_photo_read(path, IO_PHOTO_SRGB, NULL, &image, &status));
     assert_null(image);
     assert_int_equal(status.code, code);
     assert_string_equal(status.source, path);
@@ -237,6 +255,7 @@ int main(void)
         cmocka_unit_test(every_code_is_the_nearest),
         cmocka_unit_test(values_out_of_range_are_clamped),
         cmocka_unit_test(alpha_is_premultiplied_in_memory),
+        cmocka_unit_test(what_is_encoded_is_what_is_written),
         cmocka_unit_test(the_same_picture_gives_the_same_bytes),
         cmocka_unit_test(an_exr_is_read_without_a_curve),
         cmocka_unit_test(sixteen_bits_are_srgb),

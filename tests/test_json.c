@@ -382,6 +382,11 @@ static void formatted_json_is_for_people(void **state)
         text, "{\n  \"rgb\": [0.0021, 1e-07, 3],\n  \"list\": [\n    {\n      \"x\": true\n    },\n"
               "    \"y\"\n  ],\n  \"none\": {},\n  \"nothing\": []\n}\n");
     free(text);
+    text = io_json_format_line(root);
+    assert_string_equal(text,
+                        "{\"rgb\": [0.0021, 1e-07, 3], \"list\": [{\"x\": true}, \"y\"], \"none\": {}, "
+                        "\"nothing\": []}\n");
+    free(text);
     json_decref(root);
 }
 

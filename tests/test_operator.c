@@ -2,7 +2,11 @@
 
 #include <string.h>
 
-enum { PIXELS = 400, SAMPLES = 700 };
+enum { PIXELS = 400, SAMPLES = 700, FEW_SAMPLES = 6 };
+
+/* What interpolation may change, operator.h; and clusters of samples on top, clusters.h. So few samples are
+ * not put together. */
+static const double interpolation_error = 1e-4, cluster_error = 1e-3;
 
 static double predicted(const struct fit_operator *op, const dipole_coefficients *coefficients, int channel,
                         size_t pixel)
@@ -14,34 +18,49 @@ static double predicted(const struct fit_operator *op, const dipole_coefficients
     return op->colour[channel] * sum;
 }
 
-/* Largest relative difference to the direct sum over the pixels that are lit at all brightly. */
-static double worst_error(const struct fit_scene *scene, const struct fit_operator *op,
-                          const dipole_coefficients *coefficients, int channel)
+/* Relative differences to the direct sum: the largest over the pixels that are lit at all brightly, and
+ * that of the sum over all pixels. */
+struct difference {
+    double worst, sum;
+};
+
+static struct difference compare(const struct fit_scene *scene, const struct fit_operator *op,
+                                 const dipole_coefficients *coefficients, int channel)
 {
-    double direct[PIXELS], brightest = 0.0, worst = 0.0;
+    double direct[PIXELS], brightest = 0, sums[2] = { 0, 0 };
+    struct difference found = { 0 };
     for (size_t j = 0; j < PIXELS; j++) {
         direct[j] = direct_radiosity(scene, coefficients, channel, j);
         brightest = fmax(brightest, direct[j]);
     }
     for (size_t j = 0; j < PIXELS; j++) {
+        const double value = predicted(op, coefficients, channel, j);
         if (direct[j] > 1e-4 * brightest)
-            worst = fmax(worst, fabs(predicted(op, coefficients, channel, j) / direct[j] - 1.0));
+            found.worst = fmax(found.worst, fabs(value / direct[j] - 1));
+        sums[0] += direct[j];
+        sums[1] += value;
     }
-    return worst;
+    found.sum = sums[0] > 0 ? fabs(sums[1] / sums[0] - 1) : 0;
+    return found;
 }
 
-/* Oracle: the sum over all pairs, R_d evaluated at each distance. Tolerance: what operator.h promises. */
-static void operator_agrees_with_the_direct_sum(void **state)
+static double worst_error(const struct fit_scene *scene, const struct fit_operator *op,
+                          const dipole_coefficients *coefficients, int channel)
 {
-    (void)state;
+    return compare(scene, op, coefficients, channel).worst;
+}
+
+/* Largest differences over random spheres of random media. */
+static struct difference sweep(size_t sample_count)
+{
     struct rng rng = { .seed = 1 };
-    double worst = 0.0;
+    struct difference worst = { 0 };
     for (int i = 0; i < 60; i++) {
         const double finest_mm = log_uniform(&rng, 0.02, 1.0);
         const double mean_free_path_mm = finest_mm * log_uniform(&rng, 1.0, 100.0);
-        /* samples 0.1 to 2 mean free paths apart */
+        /* 700 samples are 0.1 to 2 mean free paths apart */
         struct fit_scene scene;
-        fit_scene_sphere(&scene, mean_free_path_mm * log_uniform(&rng, 1.0, 20.0), PIXELS, SAMPLES);
+        fit_scene_sphere(&scene, mean_free_path_mm * log_uniform(&rng, 1.0, 20.0), PIXELS, sample_count);
         scene.geometry.finest_mm = finest_mm;
         const double absorbed = log_uniform(&rng, 1e-6, 0.9);
         const dipole_medium medium = { .sigma_a_per_mm = absorbed / mean_free_path_mm,
@@ -51,16 +70,32 @@ static void operator_agrees_with_the_direct_sum(void **state)
         assert_true(dipole_coefficients_init(&medium, &coefficients, NULL));
         struct fit_operator *op;
         assert_true(fit_operator_create(&scene.geometry, NULL, &op, NULL));
-        const double error = worst_error(&scene, op, &coefficients, 0);
-        if (error > 1e-4)
-            print_error("case %d: error %g, sigma_a %g, sigma_s' %g, finest %g\n", i, error,
-                        medium.sigma_a_per_mm, medium.sigma_s_prime_per_mm, scene.geometry.finest_mm);
-        assert_true(error <= 1e-4);
-        worst = fmax(worst, error);
+        const struct difference found = compare(&scene, op, &coefficients, 0);
+        worst.worst = fmax(worst.worst, found.worst);
+        worst.sum = fmax(worst.sum, found.sum);
         fit_operator_destroy(op);
         fit_scene_free(&scene);
     }
-    print_message("largest difference to the direct sum %.2g\n", worst);
+    print_message("largest difference to the direct sum %.2g, of a whole picture %.2g\n", worst.worst,
+                  worst.sum);
+    return worst;
+}
+
+/* Oracle: the sum over all pairs, R_d evaluated at each distance. Tolerance: what operator.h promises. */
+static void interpolation_agrees_with_the_direct_sum(void **state)
+{
+    (void)state;
+    assert_true(sweep(FEW_SAMPLES).worst <= interpolation_error);
+}
+
+/* Oracle: the same of samples that are put together. Tolerances: what clusters.h promises, of a pixel and
+ * of all. */
+static void operator_agrees_with_the_direct_sum(void **state)
+{
+    (void)state;
+    const struct difference found = sweep(SAMPLES);
+    assert_true(found.worst <= cluster_error);
+    assert_true(found.sum <= 1e-4);
 }
 
 /* Oracle: the direct sum that leaves out pairs farther apart than the cut. A pair within float rounding of
@@ -85,8 +120,9 @@ static void light_beyond_the_cut_is_left_out(void **state)
     fit_scene_free(&scene);
 }
 
-/* Oracle: the direct sum, channel by channel, under two lights of different colours and under lights whose
- * colours are multiples of one. */
+/* Oracle: the direct sum, channel by channel, under lights whose colours are multiples of one and under two
+ * of different colours, one of which ends within the picture. Where it ends a cluster's points have the
+ * mean of both, which costs single pixels more: 1 %; of the whole, 1e-4. */
 static void light_of_many_colours_takes_a_set_each(void **state)
 {
     (void)state;
@@ -99,18 +135,58 @@ static void light_of_many_colours_takes_a_set_each(void **state)
         scene.geometry.finest_mm = 0.3;
         for (size_t i = 0; i < SAMPLES; i++) {
             scene.samples[i].flux_w[1] *= 0.5f;
-            scene.samples[i].flux_w[2] *= colours == 2 && i % 2 ? 3.0f : 0.0f;
+            scene.samples[i].flux_w[2] *=
+                colours == 2 && scene.samples[i].position_mm[0] > 1.0f ? 3.0f : 0.0f;
         }
         struct fit_operator *op;
         assert_true(fit_operator_create(&scene.geometry, NULL, &op, NULL));
         assert_int_equal(op->set_count, colours == 1 ? 1 : 3);
-        for (int c = 0; c < FIT_CHANNEL_COUNT; c++)
-            assert_true(worst_error(&scene, op, &coefficients, c) <= 1e-4);
+        for (int c = 0; c < FIT_CHANNEL_COUNT; c++) {
+            const struct difference found = compare(&scene, op, &coefficients, c);
+            assert_true(found.worst <= (colours == 1 ? cluster_error : 1e-2));
+            assert_true(found.sum <= 1e-4);
+        }
         if (colours == 1)
             assert_close(predicted(op, &coefficients, 2, 0), 0.0, 0.0, "a channel without light");
         fit_operator_destroy(op);
         fit_scene_free(&scene);
     }
+}
+
+/* Oracle: the direct sum over the samples of the pixel's own object; so few that none are put
+ * together. 1e-3: dark pixels count as well. */
+static void light_stays_in_its_object(void **state)
+{
+    (void)state;
+    const dipole_medium medium = { .sigma_a_per_mm = 0.05, .sigma_s_prime_per_mm = 2.0, .eta = 1.3 };
+    dipole_coefficients coefficients;
+    struct fit_scene scene;
+    struct fit_operator *op;
+    int objects[PIXELS];
+    assert_true(dipole_coefficients_init(&medium, &coefficients, NULL));
+    fit_scene_sphere(&scene, 8.0, PIXELS, FEW_SAMPLES);
+    scene.geometry.finest_mm = 0.3;
+    scene.geometry.objects = objects;
+    for (size_t j = 0; j < PIXELS; j++)
+        objects[j] = (int)(j % 3); /* the last has no light */
+    for (size_t i = 0; i < FEW_SAMPLES; i++)
+        scene.samples[i].object = (float)(i % 2);
+    assert_true(fit_operator_create(&scene.geometry, NULL, &op, NULL));
+    for (int object = 0; object < 3; object++) {
+        struct render_light_sample own[FEW_SAMPLES];
+        struct fit_scene alone = scene;
+        alone.samples = own;
+        alone.geometry.sample_count = 0;
+        for (size_t i = 0; i < FEW_SAMPLES; i++) {
+            if (scene.samples[i].object == (float)object)
+                own[alone.geometry.sample_count++] = scene.samples[i];
+        }
+        for (size_t j = (size_t)object; j < PIXELS; j += 3)
+            assert_close(predicted(op, &coefficients, 0, j), direct_radiosity(&alone, &coefficients, 0, j),
+                         cluster_error, "object %d, pixel %zu", object, j);
+    }
+    fit_operator_destroy(op);
+    fit_scene_free(&scene);
 }
 
 /* Oracle: itself; rows are shared between threads as they come, the numbers must not depend on it. */
@@ -147,9 +223,11 @@ static void a_scene_too_large_for_its_detail_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(interpolation_agrees_with_the_direct_sum),
         cmocka_unit_test(operator_agrees_with_the_direct_sum),
         cmocka_unit_test(light_beyond_the_cut_is_left_out),
         cmocka_unit_test(light_of_many_colours_takes_a_set_each),
+        cmocka_unit_test(light_stays_in_its_object),
         cmocka_unit_test(operator_is_the_same_bit_for_bit),
         cmocka_unit_test(a_scene_too_large_for_its_detail_is_refused),
     };

@@ -363,7 +363,7 @@ static void the_png_is_the_tone_mapped_exr(void **state)
         run(RENDER " sphere.json -o a.exr && " RENDER " sphere.json -o a.png", out, err, sizeof out), 0);
     struct io_image *const linear = read_exr("a.exr");
     struct io_image *png;
-    assert_true(io_photo_read("a.png", &png, NULL));
+    assert_true(io_photo_read("a.png", IO_PHOTO_SRGB, NULL, &png, NULL));
     size_t count = 0;
     for (size_t i = 0; i < 64 * 48; i++) {
         const float *const rgb = linear->pixels + 4 * i;

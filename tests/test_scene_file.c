@@ -647,8 +647,8 @@ static void wrong_values_are_refused(void **state)
           "3:60: unknown key \"intensity\" in lights[0], expected kind, direction, irradiance" },
         { { .lights = "{\"kind\": \"point\", \"position\": [0, 0, 1], \"intensity\": [1, 2]}" },
           "3:66: lights[0].intensity has 2 elements, expected an array of 3 numbers" },
-        { { .lights = LIGHT ", {\"kind\": \"point\", \"position\": [0, 0, 1]}" },
-          "3:79: lights[1].intensity is missing, it is required here" },
+        { { .lights = LIGHT ", {\"kind\": \"point\", \"intensity\": 1}" },
+          "3:79: lights[1].position is missing, it is required here" },
         /* environment */
         { { .more = "\"environment\": 3" }, "5:16: environment is a number, expected an object" },
         { { .more = "\"environment\": {}" }, "5:16: environment.image is missing, it is required here" },

@@ -71,7 +71,7 @@ static struct io_image *read_png(const char *path)
 {
     struct io_image *image;
     dipole_status status;
-    if (!io_photo_read(path, &image, &status))
+    if (!io_photo_read(path, IO_PHOTO_SRGB, NULL, &image, &status))
         fail_msg("%s: %s", path, status.message);
     assert_int_equal(image->width_px, 320);
     assert_int_equal(image->height_px, 240);
