@@ -165,7 +165,6 @@ static bool run_trials(struct trial *trial, const char *path, uint64_t count, di
     fit_picture_destroy(trial->picture);
     fit_photo_destroy(&photo);
     free(clean);
-    trial->picture = NULL;
     trial->photo = NULL;
     trial->clean = NULL;
     return is_done;

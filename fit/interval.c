@@ -6,6 +6,9 @@
 
 /* An interval wider than a factor of two either way tells an order of magnitude, not a value. */
 static const double widest_log_half_width = 0.6931471805599453;
+/* Where both are wider than a factor of three they run along a valley whose ends are the small errors of
+ * picture and operator, not the medium: then each may be anything that was looked for. */
+static const double valley_log_half_width = 1.0986122886681098;
 /* A sum that is this part of its terms is what rounding left. */
 static const double cancelled_share = 1e-10;
 
@@ -91,6 +94,19 @@ static void find_combination(const struct fit_certainty *certainty, int channel,
     }
 }
 
+static void open_valley(const struct fit_certainty *certainty, const int *at,
+                        struct fit_channel_estimate *out)
+{
+    struct fit_interval *const intervals[] = { &out->sigma_a_per_mm, &out->sigma_s_prime_per_mm };
+    if (!(log_half_width(intervals[0]) > valley_log_half_width &&
+          log_half_width(intervals[1]) > valley_log_half_width))
+        return;
+    for (int p = 0; p < FIT_THICKNESS; p++) {
+        intervals[p]->ci95[0] = exp(certainty->problem->lower[at[p]]);
+        intervals[p]->ci95[1] = exp(certainty->problem->upper[at[p]]);
+    }
+}
+
 static void explain(const struct fit_certainty *certainty, int channel, struct fit_channel_estimate *out)
 {
     static const char *const texts[] = { "", "the albedo alpha' is", "sigma_tr is", "sigma_t' is" };
@@ -101,6 +117,7 @@ static void explain(const struct fit_certainty *certainty, int channel, struct f
     if (out->is_identifiable)
         return;
     find_combination(certainty, channel, out);
+    open_valley(certainty, certainty->problem->layout.coefficient[channel], out);
     char told[96] = "nothing else either";
     if (out->combination != FIT_COMBINATION_NONE)
         snprintf(told, sizeof told, "%s %.4g%s [%.4g, %.4g]", texts[out->combination], out->combined.value,

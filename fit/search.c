@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { GRID_SIDE = 4, GRID_ALBEDO_COUNT = 5 };
+enum { GRID_SIDE = 8, GRID_ALBEDO_COUNT = 6 };
 
 /* Passes end when no coefficient moves by more than this: far below any interval. */
 static const double settled_log = 1e-4;
@@ -41,7 +41,7 @@ static double within(const struct fit_problem *problem, int parameter, double va
 static void choose_starts(const struct fit_problem *problem, int channel, int start_count,
                           struct candidate starts[FIT_SEARCH_START_LIMIT])
 {
-    static const double grid_albedos[GRID_ALBEDO_COUNT] = { 0.9999, 0.995, 0.9, 0.5, 0.1 };
+    static const double grid_albedos[GRID_ALBEDO_COUNT] = { 0.9999, 0.995, 0.9, 0.5, 0.1, 0.02 };
     const int *const at = problem->layout.coefficient[channel];
     struct fit_state found[FIT_TARGET_LIMIT];
     for (size_t i = 0; i < FIT_SEARCH_START_LIMIT; i++) {

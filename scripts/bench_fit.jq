@@ -69,7 +69,7 @@ def own_summary: [.[] | select(.found) | coefficients[]] as $all | ($all | map(s
 def coverage_cell: length as $n | count(.ci95[0] <= .truth and .truth <= .ci95[1]) as $inside |
     map((.ci95[1] - .ci95[0]) / 2 / .truth) as $half | map(.value / .truth) as $x | (($x | add) / $n) as $mean |
     ($x | map(pow(. - $mean; 2)) | add / $n | sqrt) as $sd |
-    "\($inside): ±\($half | median | in_percent(2)) (\(1.96 * $sd | in_percent(1)))";
+    "\($inside) of \($n): ±\($half | median | in_percent(2)) (\(1.96 * $sd | in_percent(1)))";
 
 def coverage_row($name; $truth): . as $trials |
     [range(3) as $c | $trials | map(.channels[$c].a + { truth: $truth.sigma_a_per_mm[$c] }) | coverage_cell] +
