@@ -94,17 +94,49 @@ static void find_combination(const struct fit_certainty *certainty, int channel,
     }
 }
 
-static void open_valley(const struct fit_certainty *certainty, const int *at,
+/* Whether brightness tells next to nothing, as the exposure of every target of the channel is free and
+ * unknown. */
+static bool is_exposure_unknown(const struct fit_certainty *certainty, int channel)
+{
+    const struct fit_problem *const problem = certainty->problem;
+    const size_t n = problem->layout.parameter_count;
+    bool is_unknown = true;
+    for (size_t t = 0; t < problem->target_count; t++) {
+        const int at = problem->layout.gain[t];
+        if (!(problem->targets[t].value_scale[channel] > 0))
+            continue;
+        is_unknown = is_unknown && at >= 0 &&
+                     !(certainty->quantile * sqrt(certainty->covariance[(size_t)at * n + (size_t)at]) <
+                       valley_log_half_width);
+    }
+    return is_unknown;
+}
+
+static void open_valley(const struct fit_certainty *certainty, int channel,
                         struct fit_channel_estimate *out)
 {
+    const int *const at = certainty->problem->layout.coefficient[channel];
     struct fit_interval *const intervals[] = { &out->sigma_a_per_mm, &out->sigma_s_prime_per_mm };
-    if (!(log_half_width(intervals[0]) > valley_log_half_width &&
-          log_half_width(intervals[1]) > valley_log_half_width))
+    const bool is_valley = log_half_width(intervals[0]) > valley_log_half_width &&
+                           log_half_width(intervals[1]) > valley_log_half_width;
+    if (!is_valley && !is_exposure_unknown(certainty, channel))
         return;
     for (int p = 0; p < FIT_THICKNESS; p++) {
         intervals[p]->ci95[0] = exp(certainty->problem->lower[at[p]]);
         intervals[p]->ci95[1] = exp(certainty->problem->upper[at[p]]);
     }
+}
+
+/* The least absorption that is looked for cannot be told from none. */
+static void let_absorption_vanish(const struct fit_certainty *certainty, int channel,
+                                  struct fit_channel_estimate *out)
+{
+    const int at = certainty->problem->layout.coefficient[channel][FIT_SIGMA_A];
+    if (out->sigma_a_per_mm.ci95[0] > 1.001 * exp(certainty->problem->lower[at]))
+        return;
+    out->sigma_a_per_mm.ci95[0] = 0;
+    if (out->combination == FIT_ALPHA_PRIME)
+        out->combined.ci95[1] = 1;
 }
 
 static void explain(const struct fit_certainty *certainty, int channel, struct fit_channel_estimate *out)
@@ -117,12 +149,15 @@ static void explain(const struct fit_certainty *certainty, int channel, struct f
     if (out->is_identifiable)
         return;
     find_combination(certainty, channel, out);
-    open_valley(certainty, certainty->problem->layout.coefficient[channel], out);
+    open_valley(certainty, channel, out);
+    let_absorption_vanish(certainty, channel, out);
+    const bool is_a_told = log_half_width(&out->sigma_a_per_mm) <= widest_log_half_width;
+    const bool is_s_told = log_half_width(&out->sigma_s_prime_per_mm) <= widest_log_half_width;
     char told[96] = "nothing else either";
     if (out->combination != FIT_COMBINATION_NONE)
         snprintf(told, sizeof told, "%s %.4g%s [%.4g, %.4g]", texts[out->combination], out->combined.value,
                  units[out->combination], out->combined.ci95[0], out->combined.ci95[1]);
-    if (is_s_known) {
+    if (is_s_told) {
         const bool is_low = out->sigma_a_per_mm.ci95[0] < 1e-3 * out->sigma_a_per_mm.ci95[1];
         snprintf(out->note, sizeof out->note,
                  is_low
@@ -130,7 +165,7 @@ static void explain(const struct fit_certainty *certainty, int channel, struct f
                        "to %.3g/mm"
                      : "the target does not show how much light is absorbed: sigma_a may be up to %.3g/mm",
                  out->sigma_a_per_mm.ci95[1]);
-    } else if (is_a_known) {
+    } else if (is_a_told) {
         snprintf(
             out->note, sizeof out->note,
             "the target does not show how the light is scattered: sigma_s' may be anything from %.3g to "

@@ -317,10 +317,11 @@ static void a_photograph_tells_the_material(void **state)
         image->pixels[4 * i + 3] = 1;
         clipped += is_clipped;
     }
-    image->attribute_count = 0;
     print_message("  %.3g %% are clipped\n", 100 * (double)clipped / (double)covered);
     assert_true((double)clipped > 0.04 * (double)covered);
-    assert_true(io_png_write("knot.png", image, NULL));
+    struct io_image silent = *image; /* without attributes */
+    silent.attribute_count = 0;
+    assert_true(io_png_write("knot.png", &silent, NULL));
     io_image_destroy(image);
     char irradiance[64];
     snprintf(irradiance, sizeof irradiance, "\"irradiance\": %.9g", 3 * exposure / peak);
