@@ -387,8 +387,3 @@ const struct render_capture *fit_picture_capture(const struct fit_picture *pictu
 {
     return picture->capture;
 }
-
-double fit_picture_spacing_mm(const struct fit_picture *picture)
-{
-    return picture->spacing_mm;
-}

@@ -53,6 +53,5 @@ void fit_picture_mark_outliers(struct fit_picture *picture, const struct fit_tar
 /* Of the last fit_picture_prepare. */
 const struct fit_pixels *fit_picture_pixels(const struct fit_picture *picture);
 const struct render_capture *fit_picture_capture(const struct fit_picture *picture);
-double fit_picture_spacing_mm(const struct fit_picture *picture);
 
 #endif

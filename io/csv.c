@@ -15,7 +15,7 @@ void io_csv_init(struct io_csv *csv, const char *text, size_t size, const char *
     csv->source = source;
     csv->line_limit = line_limit;
     csv->line_number = 0;
-    csv->field_count = 0;
+    csv->field_count = csv->header_count = 0;
     if (size >= 3 && memcmp(text, byte_order_mark, 3) == 0)
         csv->next += 3;
     csv->line_start = csv->next;
@@ -168,6 +168,56 @@ enum io_csv_next io_csv_next(struct io_csv *csv, dipole_status *status)
         return split(csv, end, status) ? IO_CSV_LINE : IO_CSV_FAILED;
     }
     return IO_CSV_END;
+}
+
+static bool name_column(const struct io_csv *csv, size_t field, const struct io_csv_column *names,
+                        size_t name_count, const char *expected, size_t *field_of, dipole_status *status)
+{
+    const struct io_csv_field *const name = &csv->fields[field];
+    const dipole_place place = io_csv_place(csv, name->start);
+    char text[64];
+    for (size_t i = 0; i < name_count; i++) {
+        if (!io_csv_equals(name, names[i].name))
+            continue;
+        if (names[i].column < 0)
+            return true;
+        if (field_of[names[i].column] < IO_CSV_FIELD_LIMIT)
+            return dipole_fail(status, DIPOLE_BAD_SYNTAX, &place,
+                               "column \"%s\" is the second of its kind, expected one",
+                               io_csv_printable(name, text));
+        field_of[names[i].column] = field;
+        return true;
+    }
+    return dipole_fail(status, DIPOLE_BAD_SYNTAX, &place, "unknown column \"%s\", %s",
+                       io_csv_printable(name, text), expected);
+}
+
+bool io_csv_read_header(struct io_csv *csv, const struct io_csv_column *names, size_t name_count,
+                        const char *expected, size_t *field_of, size_t column_count, dipole_status *status)
+{
+    const dipole_place place = { .source = csv->source };
+    const enum io_csv_next next = io_csv_next(csv, status);
+    if (next == IO_CSV_FAILED)
+        return false;
+    if (next == IO_CSV_END)
+        return dipole_fail(status, DIPOLE_BAD_SYNTAX, &place, "has no header line, %s", expected);
+    csv->header_count = csv->field_count;
+    for (size_t column = 0; column < column_count; column++)
+        field_of[column] = IO_CSV_FIELD_LIMIT;
+    for (size_t field = 0; field < csv->field_count; field++) {
+        if (!name_column(csv, field, names, name_count, expected, field_of, status))
+            return false;
+    }
+    return true;
+}
+
+bool io_csv_check_width(const struct io_csv *csv, dipole_status *status)
+{
+    const dipole_place place = io_csv_place(csv, csv->line_start);
+    return csv->field_count == csv->header_count ||
+           dipole_fail(status, DIPOLE_BAD_SYNTAX, &place,
+                       "the line has %zu column%s, expected the %zu of the header", csv->field_count,
+                       csv->field_count == 1 ? "" : "s", csv->header_count);
 }
 
 bool io_csv_get_number(const struct io_csv *csv, const struct io_csv_field *field, const char *name,

@@ -22,7 +22,7 @@ struct io_csv {
     int line_number; /* from 1 */
     const char *line_start;
     struct io_csv_field fields[IO_CSV_FIELD_LIMIT];
-    size_t field_count;
+    size_t field_count, header_count; /* of the current line, and of the header */
     char unquoted[IO_CSV_LINE_LIMIT]; /* fields that had quotes inside */
 };
 
@@ -47,6 +47,24 @@ size_t io_csv_count_lines(const struct io_csv *csv);
 dipole_place io_csv_place(const struct io_csv *csv, const char *at);
 
 bool io_csv_equals(const struct io_csv_field *field, const char *text);
+
+/* What a column holds, by its name in the header; several names may hold one thing. */
+struct io_csv_column {
+    const char *name;
+    int column; /* -1: known, and not read */
+};
+
+/*
+ * Read the header, the first line, and set field_of[column] of column_count columns: IO_CSV_FIELD_LIMIT
+ * where it has none. Fails with place and name where a name is not among name_count names, or a column is
+ * named twice; expected, "expected ...", ends the messages.
+ */
+DIPOLE_CHECKED bool io_csv_read_header(struct io_csv *csv, const struct io_csv_column *names,
+                                       size_t name_count, const char *expected, size_t *field_of,
+                                       size_t column_count, dipole_status *status);
+
+/* Fails unless the current line has as many fields as the header. */
+DIPOLE_CHECKED bool io_csv_check_width(const struct io_csv *csv, dipole_status *status);
 
 /* The number in a field of the current line, min..max, decimal whatever the locale. Fails with place, name
  * and what stands there. */

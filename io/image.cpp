@@ -251,8 +251,7 @@ bool read_photo(const char *path, io_photo_coding coding, io_photo_info *info_ou
     if (info_out) {
         const int whole = static_cast<int>(8 * spec.format.size());
         const int bits = spec.get_int_attribute("oiio:BitsPerSample", whole);
-        *info_out =
-            io_photo_info{ is_integer ? bits : 0, is_srgb, std::strcmp(input->format_name(), "jpeg") == 0 };
+        *info_out = io_photo_info{ is_integer ? bits : 0, is_srgb };
     }
     *image_out = owner.release();
     return true;

@@ -18,9 +18,8 @@ DIPOLE_CHECKED bool io_png_encode(const struct io_image *image, unsigned char **
 
 /* What was in the file. */
 struct io_photo_info {
-    int bits;      /* of an integer code, 8 or 16 as a rule; 0: floating point                   */
-    bool is_srgb;  /* codes were decoded                                                         */
-    bool is_lossy; /* JPEG: neighbours share what they lost                                     */
+    int bits;     /* of an integer code, 8 or 16 as a rule; 0: floating point                   */
+    bool is_srgb; /* codes were decoded                                                         */
 };
 
 /* How integers are coded. */

@@ -362,20 +362,6 @@ static bool read_homogeneous(const struct io_json *at, dipole_fdr_kind fdr_kind,
     return check_stacks(at, material, status);
 }
 
-/* What io_material_check_classical will say. */
-static void refusal_init(const struct io_json *at, struct io_material *material)
-{
-    const struct io_json layers = io_json_member(at, layers_key), model = io_json_member(at, "model");
-    if (layers.value)
-        io_json_fail(&layers, DIPOLE_NOT_SUPPORTED, &material->refusal,
-                     "cannot be done by this program, which knows the classical dipole only, expected one "
-                     "medium with the model \"dipole\"");
-    else if (material->model != DIPOLE_MODEL_DIPOLE)
-        io_json_fail(&model, DIPOLE_NOT_SUPPORTED, &material->refusal,
-                     "is \"%s\", which cannot be done by this program, expected \"dipole\"",
-                     io_model_names[material->model]);
-}
-
 bool io_material_parse(const struct io_json *at, struct io_material *out, dipole_status *status)
 {
     const char *const known[] = { "name",     "eta",    "model",  "fdr", MEDIUM_KEYS,
@@ -398,7 +384,6 @@ bool io_material_parse(const struct io_json *at, struct io_material *out, dipole
     material.is_model_stated = json_object_get(at->value, "model") != NULL;
     if (!(has_layers ? read_layers : read_homogeneous)(at, (dipole_fdr_kind)fdr_kind, &material, status))
         return false;
-    refusal_init(at, &material);
     *out = material;
     return true;
 }
@@ -426,21 +411,6 @@ void io_material_set_media(struct io_material *material, const dipole_medium med
     material->layer_count = 1;
     for (size_t c = 0; c < IO_CHANNEL_COUNT; c++)
         material->layers[c][0] = (dipole_layer){ .medium = media[c], .thickness_mm = INFINITY };
-}
-
-bool io_material_check_classical(const struct io_material *material, dipole_status *status)
-{
-    if (material->refusal.code == DIPOLE_OK && material->model == DIPOLE_MODEL_DIPOLE &&
-        !io_material_has_layers(material))
-        return true;
-    if (material->refusal.code == DIPOLE_OK)
-        return dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL,
-                           "material \"%.100s\" has layers or another model, expected one medium with the "
-                           "model \"dipole\"",
-                           material->name);
-    if (status)
-        *status = material->refusal;
-    return false;
 }
 
 /* ---- bundled materials ---------------------------------------------------------------------------- */

@@ -24,7 +24,6 @@ struct io_material {
     size_t layer_count;
     dipole_layer layers[IO_CHANNEL_COUNT][DIPOLE_LAYER_LIMIT]; /* checked by dipole_stack_create    */
     char layer_names[DIPOLE_LAYER_LIMIT][64];                  /* "epidermis", or ""                */
-    dipole_status refusal; /* of io_material_check_classical, when a file asks for more; else DIPOLE_OK */
 };
 
 /* More than one layer, or one that ends. */
@@ -32,10 +31,6 @@ bool io_material_has_layers(const struct io_material *material);
 
 /* Make it a half-space of these media, one for each channel. */
 void io_material_set_media(struct io_material *material, const dipole_medium media[IO_CHANNEL_COUNT]);
-
-/* Fail unless the material is one homogeneous medium with the model "dipole": for programs that know no
- * other. The message names file, place and key. */
-DIPOLE_CHECKED bool io_material_check_classical(const struct io_material *material, dipole_status *status);
 
 /* Read and check a material file. Fails with place (line, column where JSON has them) and the key. */
 DIPOLE_CHECKED bool io_material_read(const char *path, struct io_material *out, dipole_status *status);

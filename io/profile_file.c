@@ -11,12 +11,9 @@
 #define VALUE_LIMIT_PER_MM2 1e100
 
 /* What a column holds. Those that MCML's tables have beside are known and not read. */
-enum column { R, R_LO, R_HI, RD, SEM, NOT_READ, COLUMN_COUNT };
+enum column { R, R_LO, R_HI, RD, SEM, COLUMN_COUNT, NOT_READ = -1 };
 
-static const struct {
-    const char *name;
-    enum column column;
-} column_names[] = {
+static const struct io_csv_column column_names[] = {
     { "r_mm", R },
     { "r_lo_mm", R_LO },
     { "r_hi_mm", R_HI },
@@ -36,50 +33,17 @@ static const char expected_columns[] = "expected r_mm,rd_per_mm2[,sem] or r_lo_m
 struct reader {
     struct io_csv csv;
     size_t field_of[COLUMN_COUNT]; /* IO_CSV_FIELD_LIMIT for none */
-    size_t column_count;           /* that the header has         */
     bool is_per_incident;
     dipole_status *status;
 };
 
 /* ---- the header ---------------------------------------------------------------------------------- */
 
-static bool name_column(struct reader *reader, size_t field)
-{
-    const struct io_csv_field *const name = &reader->csv.fields[field];
-    const dipole_place place = io_csv_place(&reader->csv, name->start);
-    char text[64];
-    for (size_t i = 0; i < sizeof column_names / sizeof column_names[0]; i++) {
-        const enum column column = column_names[i].column;
-        if (!io_csv_equals(name, column_names[i].name))
-            continue;
-        if (column != NOT_READ && reader->field_of[column] < IO_CSV_FIELD_LIMIT)
-            return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place,
-                               "column \"%s\" is the second of its kind, expected one",
-                               io_csv_printable(name, text));
-        reader->field_of[column] = field;
-        reader->is_per_incident |= column == RD && strcmp(column_names[i].name, per_incident_name) == 0;
-        return true;
-    }
-    return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place, "unknown column \"%s\", %s",
-                       io_csv_printable(name, text), expected_columns);
-}
-
 static bool read_header(struct reader *reader)
 {
-    const enum io_csv_next next = io_csv_next(&reader->csv, reader->status);
-    if (next == IO_CSV_FAILED)
+    if (!io_csv_read_header(&reader->csv, column_names, sizeof column_names / sizeof column_names[0],
+                            expected_columns, reader->field_of, COLUMN_COUNT, reader->status))
         return false;
-    if (next == IO_CSV_END) {
-        const dipole_place place = { .source = reader->csv.source };
-        return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place, "has no header line, %s",
-                           expected_columns);
-    }
-    for (int column = 0; column < COLUMN_COUNT; column++)
-        reader->field_of[column] = IO_CSV_FIELD_LIMIT;
-    reader->column_count = reader->csv.field_count;
-    for (size_t i = 0; i < reader->column_count; i++)
-        if (!name_column(reader, i))
-            return false;
     const size_t *const field_of = reader->field_of;
     const bool has_r = field_of[R] < IO_CSV_FIELD_LIMIT, has_lo = field_of[R_LO] < IO_CSV_FIELD_LIMIT,
                has_hi = field_of[R_HI] < IO_CSV_FIELD_LIMIT;
@@ -91,6 +55,8 @@ static bool read_header(struct reader *reader)
                            : has_hi ? "r_hi_mm without r_lo_mm"
                                     : "no distance",
                            expected_columns);
+    reader->is_per_incident = field_of[RD] < IO_CSV_FIELD_LIMIT &&
+                              io_csv_equals(&reader->csv.fields[field_of[RD]], per_incident_name);
     return field_of[RD] < IO_CSV_FIELD_LIMIT ||
            dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place, "the header has no rd_per_mm2, %s",
                        expected_columns);
@@ -110,12 +76,8 @@ static bool read_row(const struct reader *reader, struct io_profile *profile)
 {
     const struct io_csv *const csv = &reader->csv;
     const size_t i = profile->count;
-    if (csv->field_count != reader->column_count) {
-        const dipole_place place = io_csv_place(csv, csv->line_start);
-        return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place,
-                           "the line has %zu column%s, expected the %zu of the header", csv->field_count,
-                           csv->field_count == 1 ? "" : "s", reader->column_count);
-    }
+    if (!io_csv_check_width(csv, reader->status))
+        return false;
     double *const lo = &profile->r_lo_mm[i], *const hi = &profile->r_hi_mm[i];
     const double limit = DIPOLE_THICKNESS_MAX_MM;
     if (!(profile->has_rings ? get_number(reader, R_LO, "r_lo_mm", 0, limit, lo) &&

@@ -13,12 +13,17 @@
 enum { THICKNESS = 2 * IO_TOTAL_KIND_COUNT, CHANNEL, COLUMN_COUNT };
 
 /* Each value is followed by its error. */
-static const char *const column_names[COLUMN_COUNT] = {
-    "diffuse_reflectance",   "diffuse_reflectance_sem",
-    "diffuse_transmittance", "diffuse_transmittance_sem",
-    "total_reflectance",     "total_reflectance_sem",
-    "total_transmittance",   "total_transmittance_sem",
-    "thickness_mm",          "channel",
+static const struct io_csv_column column_names[COLUMN_COUNT] = {
+    { "diffuse_reflectance", 2 * IO_TOTAL_DIFFUSE_REFLECTANCE },
+    { "diffuse_reflectance_sem", 2 * IO_TOTAL_DIFFUSE_REFLECTANCE + 1 },
+    { "diffuse_transmittance", 2 * IO_TOTAL_DIFFUSE_TRANSMITTANCE },
+    { "diffuse_transmittance_sem", 2 * IO_TOTAL_DIFFUSE_TRANSMITTANCE + 1 },
+    { "total_reflectance", 2 * IO_TOTAL_REFLECTANCE },
+    { "total_reflectance_sem", 2 * IO_TOTAL_REFLECTANCE + 1 },
+    { "total_transmittance", 2 * IO_TOTAL_TRANSMITTANCE },
+    { "total_transmittance_sem", 2 * IO_TOTAL_TRANSMITTANCE + 1 },
+    { "thickness_mm", THICKNESS },
+    { "channel", CHANNEL },
 };
 static const char expected_columns[] =
     "expected thickness_mm, diffuse_ or total_reflectance or _transmittance, each perhaps with _sem, and "
@@ -27,7 +32,6 @@ static const char expected_columns[] =
 struct reader {
     struct io_csv csv;
     size_t field_of[COLUMN_COUNT]; /* IO_CSV_FIELD_LIMIT for none */
-    size_t column_count;
     dipole_status *status;
 };
 
@@ -38,42 +42,11 @@ static bool has(const struct reader *reader, int column)
 
 /* ---- the header -------------------------------------------------------------------------------------- */
 
-static bool name_column(struct reader *reader, size_t field)
-{
-    const struct io_csv_field *const name = &reader->csv.fields[field];
-    const dipole_place place = io_csv_place(&reader->csv, name->start);
-    char text[64];
-    for (int column = 0; column < COLUMN_COUNT; column++) {
-        if (!io_csv_equals(name, column_names[column]))
-            continue;
-        if (has(reader, column))
-            return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place,
-                               "column \"%s\" is the second of its kind, expected one",
-                               io_csv_printable(name, text));
-        reader->field_of[column] = field;
-        return true;
-    }
-    return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place, "unknown column \"%s\", %s",
-                       io_csv_printable(name, text), expected_columns);
-}
-
 static bool read_header(struct reader *reader)
 {
-    const enum io_csv_next next = io_csv_next(&reader->csv, reader->status);
-    if (next == IO_CSV_FAILED)
+    if (!io_csv_read_header(&reader->csv, column_names, COLUMN_COUNT, expected_columns, reader->field_of,
+                            COLUMN_COUNT, reader->status))
         return false;
-    if (next == IO_CSV_END) {
-        const dipole_place place = { .source = reader->csv.source };
-        return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place, "has no header line, %s",
-                           expected_columns);
-    }
-    for (int column = 0; column < COLUMN_COUNT; column++)
-        reader->field_of[column] = IO_CSV_FIELD_LIMIT;
-    reader->column_count = reader->csv.field_count;
-    for (size_t i = 0; i < reader->column_count; i++) {
-        if (!name_column(reader, i))
-            return false;
-    }
     const dipole_place place = io_csv_place(&reader->csv, reader->csv.line_start);
     bool has_value = false;
     for (int kind = 0; kind < IO_TOTAL_KIND_COUNT; kind++)
@@ -118,14 +91,9 @@ static bool get_channel(const struct reader *reader, int *out)
 static bool read_row(const struct reader *reader, struct io_totals *totals)
 {
     const struct io_csv *const csv = &reader->csv;
-    if (csv->field_count != reader->column_count) {
-        const dipole_place place = io_csv_place(csv, csv->line_start);
-        return dipole_fail(reader->status, DIPOLE_BAD_SYNTAX, &place,
-                           "the line has %zu column%s, expected the %zu of the header", csv->field_count,
-                           csv->field_count == 1 ? "" : "s", reader->column_count);
-    }
     struct io_total total = { 0 };
-    if (!get_thickness(reader, &total.thickness_mm) || !get_channel(reader, &total.channel))
+    if (!io_csv_check_width(csv, reader->status) || !get_thickness(reader, &total.thickness_mm) ||
+        !get_channel(reader, &total.channel))
         return false;
     for (int kind = 0; kind < IO_TOTAL_KIND_COUNT; kind++) {
         const int value = 2 * kind, error = 2 * kind + 1;
@@ -133,10 +101,10 @@ static bool read_row(const struct reader *reader, struct io_totals *totals)
             continue;
         total.kind = (enum io_total_kind)kind;
         total.sem = 0;
-        if (!io_csv_get_number(csv, field_of(reader, value), column_names[value], 0, 1, &total.value,
+        if (!io_csv_get_number(csv, field_of(reader, value), column_names[value].name, 0, 1, &total.value,
                                reader->status) ||
             (has(reader, error) && field_of(reader, error)->length > 0 &&
-             !io_csv_get_number(csv, field_of(reader, error), column_names[error], 0, 1, &total.sem,
+             !io_csv_get_number(csv, field_of(reader, error), column_names[error].name, 0, 1, &total.sem,
                                 reader->status)))
             return false;
         totals->totals[totals->count++] = total;

@@ -403,36 +403,7 @@ static void every_model_is_read(void **state)
         assert_true(parse(text, &material, NULL));
         assert_int_equal(material.model, model);
         assert_false(io_material_has_layers(&material));
-        assert_int_equal(io_material_check_classical(&material, NULL), model == DIPOLE_MODEL_DIPOLE);
     }
-}
-
-/* Oracle: the messages as a user should read them, at the key that asks for more. */
-static void programs_of_the_dipole_refuse_the_rest(void **state)
-{
-    (void)state;
-    struct io_material material;
-    dipole_status status;
-    assert_true(parse(HEAD "\"model\": \"beam\", " SIGMAS "}", &material, NULL));
-    assert_false(io_material_check_classical(&material, &status));
-    assert_int_equal(status.code, DIPOLE_NOT_SUPPORTED);
-    assert_string_equal(status.source, "m.json");
-    assert_int_equal(status.line, 2);
-    assert_int_equal(status.column, 10);
-    assert_string_equal(status.message,
-                        "model is \"beam\", which cannot be done by this program, expected \"dipole\"");
-    assert_true(parse(HEAD "\"layers\": [" LAYER("\"infinite\"") "]}", &material, NULL));
-    assert_false(io_material_check_classical(&material, &status));
-    assert_int_equal(status.column, 11);
-    assert_string_equal(status.message,
-                        "layers cannot be done by this program, which knows the classical dipole only, "
-                        "expected one medium with the model \"dipole\"");
-    /* one that no file holds */
-    material = (struct io_material){ .name = "made", .model = DIPOLE_MODEL_BEAM, .layer_count = 1 };
-    assert_false(io_material_check_classical(&material, &status));
-    assert_string_equal(status.message,
-                        "material \"made\" has layers or another model, expected one medium "
-                        "with the model \"dipole\"");
 }
 
 /* Oracle: the way forth. A material given by reflectance and length has that reflectance and that length,
@@ -676,7 +647,6 @@ int main(void)
         cmocka_unit_test(failures_in_layers_name_the_layer),
         cmocka_unit_test(layers_are_read_from_the_top),
         cmocka_unit_test(every_model_is_read),
-        cmocka_unit_test(programs_of_the_dipole_refuse_the_rest),
         cmocka_unit_test(reflectance_and_length_give_the_coefficients),
         cmocka_unit_test(a_material_inside_a_scene_is_named_by_its_path),
         cmocka_unit_test(a_unit_slip_is_warned_of),

@@ -3,6 +3,7 @@
  * (--wrap). Those of the libraries are their own affair. The sanitizers' build sees what is not freed.
  */
 #include "tests/check.h"
+#include "tests/failing_allocation.h"
 
 #include "io/dds.h"
 #include "io/raw.h"
@@ -10,33 +11,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-
-static int call_count;   /* allocations asked for */
-static int refused_call; /* which of them fails, from 1; 0 for none */
-
-/* NOLINTBEGIN(bugprone-reserved-identifier): the names are the linker's. */
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-
-void *__wrap_malloc(size_t size)
-{
-    return ++call_count == refused_call ? NULL : __real_malloc(size);
-}
-
-void *__wrap_calloc(size_t count, size_t size)
-{
-    return ++call_count == refused_call ? NULL : __real_calloc(count, size);
-}
-
-void *__wrap_realloc(void *old, size_t size)
-{
-    return ++call_count == refused_call ? NULL : __real_realloc(old, size);
-}
-/* NOLINTEND(bugprone-reserved-identifier) */
 
 enum { ATTRIBUTE_COUNT = 40 }; /* more than one growth */
 
