@@ -63,7 +63,8 @@ static void read_errors(struct fit_photo *photo)
     read_model(photo);
     photo->cut_mm = number_of(image, "dipole:r_max_mm", INFINITY);
     const bool is_blur_known = read_blur(photo);
-    const bool is_splatted = number_of(image, "dipole:spacing_mm", 0) > 0;
+    photo->spacing_mm = number_of(image, "dipole:spacing_mm", 0);
+    const bool is_splatted = photo->spacing_mm > 0;
     const double bound = is_splatted ? number_of(image, "dipole:table_error", epsilon) +
                                            number_of(image, "dipole:banding_error", 0) +
                                            (is_blur_known ? 0 : number_of(image, "dipole:blur_error", 0))

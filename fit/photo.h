@@ -17,6 +17,7 @@ struct fit_photo {
     dipole_model model; /* of its material; only where has_model                      */
     bool has_model;
     double cut_mm;                     /* light farther than this was left out; INFINITY: none was   */
+    double spacing_mm;                 /* of its light samples; 0: not stated                        */
     double blur_mm[FIT_CHANNEL_COUNT]; /* of its profile, T34; 0: none                               */
     struct fit_systematic systematic;
 };

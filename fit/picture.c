@@ -319,7 +319,8 @@ bool fit_picture_prepare(struct fit_picture *picture, const struct fit_progress 
         .is_black_free = picture->request.is_black_free,
         .is_coloured_by_camera = true,
         .systematic = picture->systematic,
-        .pixel_mm = pixel_size_mm(picture),
+        /* light samples put patches of light together, which errs twice as much as pixels do */
+        .pixel_mm = hypot(pixel_size_mm(picture), sqrt(2) * picture->request.photo->spacing_mm),
         .finest_mm = finest_share * picture->spacing_mm,
         .largest_mm = picture->op->node_r_mm[picture->op->node_count - 1],
     };

@@ -48,7 +48,7 @@ struct fit_target {
     double value_scale[FIT_CHANNEL_COUNT];   /* the mean of |value|: the unit of black; 0: no data  */
     double ambient_scale[FIT_CHANNEL_COUNT]; /* the ambient that would make as much            */
     struct fit_systematic systematic;
-    double pixel_mm; /* what a pixel shows of the surface, across; 0: there are none                */
+    double pixel_mm; /* below this nothing is certain: pixels, light samples; 0: there are none     */
     double finest_mm, largest_mm; /* mean free paths that the target could tell apart: from, to         */
 };
 
