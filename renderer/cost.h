@@ -14,21 +14,23 @@
 #define RENDER_COST_LEVELS_MS 60.0
 
 /* Nanoseconds each. */
-#define RENDER_COST_TRIANGLE 120.0        /* drawn once, whatever it covers               */
-#define RENDER_COST_TRIANGLE_4 350.0      /* the same, where pixels have four points      */
-#define RENDER_COST_SURFACE_PIXEL 180.0   /* cleared, drawn and resolved                  */
-#define RENDER_COST_VIEW_TEXEL 17.0       /* of a light's view, cleared and drawn         */
-#define RENDER_COST_READ_TEXEL 25.0       /* of the view, read back and put into samples  */
-#define RENDER_COST_SHADOW_PIXEL 400.0    /* lit and shaded at one point                  */
-#define RENDER_COST_COMPOSITE_PIXEL 220.0 /* covered                                      */
-#define RENDER_COST_SPLAT_EVALUATION 2.8  /* one sample at one pixel                      */
-#define RENDER_COST_MAP_TEXEL 37.0        /* of a translucent shadow map: drawn, levels made  */
-#define RENDER_COST_MAP_SAMPLE 66.0       /* one sample of a map at one point             */
-#define RENDER_COST_MAP_LAYER 25.0        /* each layer that it looks into                */
-#define RENDER_COST_MAP_CELL 40.0         /* one cell of the local response at one pixel  */
-#define RENDER_COST_MAP_EVALUATION 20.0   /* one texel of a map at one pixel              */
-#define RENDER_COST_SCREEN_PIXEL 6.0      /* touched by a simple pass                     */
-#define RENDER_COST_POINTS_PIXEL 80.0     /* whose four points are looked at */
+#define RENDER_COST_TRIANGLE 90.0        /* drawn once, whatever it covers               */
+#define RENDER_COST_TRIANGLE_4 170.0     /* the same, where pixels have four points      */
+#define RENDER_COST_EMPTY_PIXEL 12.0     /* cleared and looked at                        */
+#define RENDER_COST_SURFACE_PIXEL 80.0   /* covered: four points found, one resolved     */
+#define RENDER_COST_VIEW_TEXEL 17.0      /* of a light's view, cleared and drawn         */
+#define RENDER_COST_READ_TEXEL 25.0      /* of the view, read back and put into samples  */
+#define RENDER_COST_SHADOW_PIXEL 100.0   /* covered, lit and shaded at one point         */
+#define RENDER_COST_GLOSS_PIXEL 260.0    /* the same, some at four                       */
+#define RENDER_COST_COMPOSITE_PIXEL 45.0 /* covered                                      */
+#define RENDER_COST_SPLAT_EVALUATION 2.8 /* one sample at one pixel                      */
+#define RENDER_COST_MAP_TEXEL 37.0       /* of a translucent shadow map: drawn, levels made  */
+#define RENDER_COST_MAP_SAMPLE 66.0      /* one sample of a map at one point             */
+#define RENDER_COST_MAP_LAYER 25.0       /* each layer that it looks into                */
+#define RENDER_COST_MAP_CELL 40.0        /* one cell of the local response at one pixel  */
+#define RENDER_COST_MAP_EVALUATION 20.0  /* one texel of a map at one pixel              */
+#define RENDER_COST_SCREEN_PIXEL 6.0     /* touched by a simple pass                     */
+#define RENDER_COST_POINTS_PIXEL 180.0   /* whose four points are looked at */
 
 static inline double render_cost_ms(double ns_each, double count)
 {

@@ -1,7 +1,7 @@
 #include "renderer/effects.h"
 
 const struct render_effect *const render_effects[] = {
-    &render_effect_surface,    &render_effect_object_ids,
+    &render_effect_object_ids, &render_effect_surface,
     &render_effect_light_view, &render_effect_light_samples,
     &render_effect_specular,   &render_effect_lambert,
     &render_effect_splat,      &render_effect_overlap,

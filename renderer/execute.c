@@ -1,5 +1,7 @@
 #include "renderer/execute.h"
 
+#include "renderer/geometry.h"
+#include "renderer/solid.h"
 #include "renderer/splat_draw.h"
 #include "renderer/tsm_draw.h"
 
@@ -34,16 +36,18 @@ struct texture {
 
 /* One object's arrays. */
 struct mesh {
-    GLuint vertex_array, buffers[3];
+    GLuint vertex_array, index_buffer;
     GLsizei index_count;
-    size_t first_vertex; /* counted over all meshes */
-    double roughness;    /* 0: no gloss */
+    size_t first_vertex, first_triangle; /* counted over all meshes */
+    bool is_solid;                       /* has no triangle that is seen from behind */
+    double roughness;                    /* 0: no gloss */
 };
 
 struct render_executor {
     struct render_gl_errors *errors;
     struct mesh *meshes;
     size_t mesh_count;
+    struct render_geometry geometry;
     GLuint empty_vertex_array;
     struct program programs[PROGRAM_LIMIT];
     size_t program_count;
@@ -53,6 +57,8 @@ struct render_executor {
     struct render_splatter *splatter;           /* NULL until light is first sampled */
     struct render_tsm *tsm;                     /* NULL until a shadow map is first gathered */
     struct render_buffer_texture object_buffer; /* of render_executor_fill_media     */
+    struct render_buffer_texture roughness_buffer;
+    float point_places[SAMPLES_PER_PIXEL][2]; /* of a pixel's points: 0 to 1 across it */
 };
 
 static double now_ms(void)
@@ -64,26 +70,42 @@ static double now_ms(void)
 
 /* ---- buffers ------------------------------------------------------------------------------------ */
 
-static void mesh_create(struct mesh *mesh, const struct io_object *object)
+static void mesh_create(struct mesh *mesh, const struct io_object *object,
+                        const struct render_geometry *geometry)
 {
     const struct io_mesh *const source = object->mesh;
-    const void *const data[3] = { source->positions, source->normals, source->indices };
-    const size_t sizes[3] = { source->vertex_count * 3 * sizeof(float),
-                              source->vertex_count * 3 * sizeof(float),
-                              source->triangle_count * 3 * sizeof(uint32_t) };
     glCreateVertexArrays(1, &mesh->vertex_array);
-    glCreateBuffers(3, mesh->buffers);
-    for (int i = 0; i < 3; i++)
-        glNamedBufferStorage(mesh->buffers[i], (GLsizeiptr)sizes[i], data[i], 0);
-    for (GLuint i = 0; i < 2; i++) { /* locations 0: position_mm, 1: normal */
-        glVertexArrayVertexBuffer(mesh->vertex_array, i, mesh->buffers[i], 0, 3 * sizeof(float));
+    for (GLuint i = 0; i < RENDER_VERTEX_ARRAYS; i++) { /* locations 0: position_mm, 1: normal */
+        glVertexArrayVertexBuffer(mesh->vertex_array, i, geometry->vertices[i].buffer,
+                                  (GLintptr)(mesh->first_vertex * 3 * sizeof(float)), 3 * sizeof(float));
         glVertexArrayAttribFormat(mesh->vertex_array, i, 3, GL_FLOAT, GL_FALSE, 0);
         glVertexArrayAttribBinding(mesh->vertex_array, i, i);
         glEnableVertexArrayAttrib(mesh->vertex_array, i);
     }
-    glVertexArrayElementBuffer(mesh->vertex_array, mesh->buffers[2]);
+    glCreateBuffers(1, &mesh->index_buffer);
+    glNamedBufferStorage(mesh->index_buffer, (GLsizeiptr)(source->triangle_count * 3 * sizeof(uint32_t)),
+                         source->indices, 0);
+    glVertexArrayElementBuffer(mesh->vertex_array, mesh->index_buffer);
     mesh->index_count = (GLsizei)(source->triangle_count * 3);
     mesh->roughness = object->has_specular ? object->roughness : 0;
+}
+
+static bool meshes_create(struct render_executor *executor, const struct io_scene *scene,
+                          dipole_status *status)
+{
+    size_t vertex_count = 0, triangle_count = 0;
+    bool done = render_geometry_create(scene, &executor->geometry, status);
+    for (size_t i = 0; done && i < scene->object_count; i++) {
+        struct mesh *const mesh = &executor->meshes[i];
+        const struct io_mesh *const source = scene->objects[i].mesh;
+        mesh->first_vertex = vertex_count;
+        mesh->first_triangle = triangle_count;
+        mesh_create(mesh, &scene->objects[i], &executor->geometry);
+        done = render_mesh_is_solid(source, &mesh->is_solid, status);
+        vertex_count += source->vertex_count;
+        triangle_count += source->triangle_count;
+    }
+    return done;
 }
 
 /* A texture that a pass keeps by itself is not ours to delete. */
@@ -108,14 +130,9 @@ bool render_executor_create(const struct io_scene *scene, struct render_gl_error
     executor->errors = errors;
     executor->meshes = meshes;
     executor->mesh_count = scene->object_count;
-    size_t vertex_count = 0;
-    for (size_t i = 0; i < scene->object_count; i++) {
-        mesh_create(&meshes[i], &scene->objects[i]);
-        meshes[i].first_vertex = vertex_count;
-        vertex_count += scene->objects[i].mesh->vertex_count;
-    }
     glCreateVertexArrays(1, &executor->empty_vertex_array);
-    if (!render_gl_check(errors, "upload of the meshes", status)) {
+    if (!meshes_create(executor, scene, status) ||
+        !render_gl_check(errors, "upload of the meshes", status)) {
         render_executor_destroy(executor);
         return false;
     }
@@ -129,8 +146,9 @@ void render_executor_destroy(struct render_executor *executor)
         return;
     for (size_t i = 0; i < executor->mesh_count; i++) {
         glDeleteVertexArrays(1, &executor->meshes[i].vertex_array);
-        glDeleteBuffers(3, executor->meshes[i].buffers);
+        glDeleteBuffers(1, &executor->meshes[i].index_buffer);
     }
+    render_geometry_destroy(&executor->geometry);
     for (size_t i = 0; i < executor->program_count; i++)
         glDeleteProgram(executor->programs[i].handle);
     for (size_t i = 0; i < executor->texture_count; i++)
@@ -138,6 +156,7 @@ void render_executor_destroy(struct render_executor *executor)
     render_splatter_destroy(executor->splatter);
     render_tsm_destroy(executor->tsm);
     render_buffer_texture_destroy(&executor->object_buffer);
+    render_buffer_texture_destroy(&executor->roughness_buffer);
     glDeleteVertexArrays(1, &executor->empty_vertex_array);
     free(executor->meshes);
     free(executor);
@@ -238,6 +257,7 @@ static void texture_size(const struct render_plan *plan, const struct render_tex
 
 static const GLenum formats[] = { [RENDER_RGBA32F] = GL_RGBA32F,
                                   [RENDER_R32F] = GL_R32F,
+                                  [RENDER_R32UI] = GL_R32UI,
                                   [RENDER_DEPTH32F] = GL_DEPTH_COMPONENT32F,
                                   [RENDER_OTHER] = GL_NONE };
 
@@ -379,6 +399,54 @@ bool render_executor_fill_media(const struct render_frame *frame, dipole_status 
     return true;
 }
 
+/* What shaders need to know of the triangles that a pixel shows (common/points.glsl). */
+bool render_executor_use_meshes(const struct render_frame *frame, dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    float *const roughness = calloc(executor->mesh_count, sizeof *roughness);
+    if (!roughness)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the gloss of %zu objects",
+                           executor->mesh_count);
+    for (size_t i = 0; i < executor->mesh_count; i++)
+        roughness[i] = (float)executor->meshes[i].roughness;
+    render_buffer_texture_fill(&executor->roughness_buffer, GL_R32F, roughness,
+                               executor->mesh_count * sizeof *roughness);
+    free(roughness);
+    const struct render_geometry *const geometry = &executor->geometry;
+    render_executor_hand_on(executor, "mesh_triangles", geometry->triangles.texture);
+    render_executor_hand_on(executor, "mesh_positions_mm",
+                            geometry->vertices[RENDER_VERTEX_POSITION].texture);
+    render_executor_hand_on(executor, "mesh_normals", geometry->vertices[RENDER_VERTEX_NORMAL].texture);
+    render_executor_hand_on(executor, "mesh_roughness", executor->roughness_buffer.texture);
+    return true;
+}
+
+/* OpenGL chooses the places; it tells those of the framebuffer that is drawn to. */
+void render_executor_find_points(const struct render_frame *frame)
+{
+    for (GLuint i = 0; i < SAMPLES_PER_PIXEL; i++)
+        glGetMultisamplefv(GL_SAMPLE_POSITION, i, frame->executor->point_places[i]);
+}
+
+void render_set_points(const struct render_frame *frame)
+{
+    const struct render_plan *const plan = frame->plan;
+    const struct render_projection *const camera = &plan->camera;
+    double corner[3], right[3], up[3];
+    for (int k = 0; k < 3; k++) {
+        const double middle = camera->is_orthographic ? camera->eye_mm[k] : camera->forward[k];
+        right[k] = 2 * camera->half_width / plan->width_px * camera->right[k];
+        up[k] = 2 * camera->half_height / plan->height_px * camera->up[k];
+        corner[k] = middle - camera->half_width * camera->right[k] - camera->half_height * camera->up[k];
+    }
+    render_set_vec3(frame->program, "ray_corner", corner);
+    render_set_vec3(frame->program, "ray_right", right);
+    render_set_vec3(frame->program, "ray_up", up);
+    glProgramUniform2fv(frame->program, glGetUniformLocation(frame->program, "point_places"),
+                        SAMPLES_PER_PIXEL, frame->executor->point_places[0]);
+    render_set_camera(frame->program, plan);
+}
+
 /* ---- counts ------------------------------------------------------------------------------------- */
 
 size_t render_executor_program_count(const struct render_executor *executor)
@@ -446,10 +514,13 @@ static bool attach_targets(const struct render_frame *frame, const struct render
                            pass->name);
     for (size_t w = 0; writes[w]; w++) {
         struct texture *const target = texture_find(frame->executor, writes[w]);
+        const GLuint nothing[4] = { 0, 0, 0, 0 };
         float value[4] = { 0, 0, 0, 0 };
         if (target->kind->is_far_where_empty && frame->view)
             far_point(frame->view, value);
-        if (target->kind->format != RENDER_OTHER && (!pass->is_added || !target->is_written))
+        if (target->kind->format == RENDER_R32UI)
+            glClearNamedFramebufferuiv(framebuffer, GL_COLOR, (GLint)w, nothing);
+        else if (target->kind->format != RENDER_OTHER && (!pass->is_added || !target->is_written))
             glClearNamedFramebufferfv(framebuffer, GL_COLOR, (GLint)w, value);
         target->is_written = true;
     }
@@ -462,7 +533,8 @@ static bool attach_targets(const struct render_frame *frame, const struct render
 
 static void set_state(const struct render_frame *frame, const struct render_pass *pass)
 {
-    const struct render_texture *const target = render_texture_find(pass->writes[0]);
+    const struct render_texture *const target =
+        render_texture_find(pass->writes[0] ? pass->writes[0] : pass->depth_written);
     const bool is_map = target->size == RENDER_SIZE_MAP;
     int width_px, height_px;
     texture_size(frame->plan, target, &width_px, &height_px);
@@ -477,7 +549,8 @@ static void set_state(const struct render_frame *frame, const struct render_pass
     glBlendFunc(GL_ONE, GL_ONE);
     (pass->depth_written || pass->depth_tested ? glEnable : glDisable)(GL_DEPTH_TEST);
     glDepthMask(pass->depth_written ? GL_TRUE : GL_FALSE);
-    glDepthFunc(pass->draw == RENDER_DRAW_FULLSCREEN ? GL_ALWAYS : GL_LESS);
+    /* The triangle over the target is in front of all that a pixel shows, and of none where it is empty. */
+    glDepthFunc(pass->draw == RENDER_DRAW_FULLSCREEN && pass->depth_written ? GL_ALWAYS : GL_LESS);
     glDisable(GL_CULL_FACE);
 }
 
@@ -486,9 +559,9 @@ void render_draw_object(const struct render_frame *frame, size_t object)
     const struct mesh *const mesh = &frame->executor->meshes[object];
     const struct render_plan *const plan = frame->plan;
     const struct render_medium *const medium = &plan->media->media[plan->objects[object].medium];
-    render_set_float(frame->program, "roughness", mesh->roughness);
     render_set_float(frame->program, "object", (double)(object + 1));
     render_set_int(frame->program, "first_vertex", (int)mesh->first_vertex);
+    render_set_int(frame->program, "first_triangle", (int)mesh->first_triangle);
     render_set_float(frame->program, "object_eta", medium->eta);
     glBindVertexArray(mesh->vertex_array);
     glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
@@ -509,6 +582,18 @@ void render_bind_buffer(const struct render_frame *frame, const char *name, int 
     render_set_int(frame->program, name, unit);
 }
 
+/* Whether the eye or light is outside of an object: then no triangle of a solid is seen from behind. */
+static bool is_seen_from_outside(const struct render_frame *frame, size_t object)
+{
+    const struct render_projection *const view =
+        frame->view ? &frame->view->projection : &frame->plan->camera;
+    const struct render_ball *const ball = &frame->plan->objects[object].ball;
+    double distance2 = 0;
+    for (int k = 0; k < 3; k++)
+        distance2 += (ball->centre_mm[k] - view->eye_mm[k]) * (ball->centre_mm[k] - view->eye_mm[k]);
+    return view->is_orthographic || distance2 > ball->radius_mm * ball->radius_mm;
+}
+
 static bool draw(const struct render_frame *frame, const struct render_pass *pass, dipole_status *status)
 {
     if (pass->draw == RENDER_DRAW_BY_RUN)
@@ -517,8 +602,12 @@ static bool draw(const struct render_frame *frame, const struct render_pass *pas
         render_draw_fullscreen(frame);
         return true;
     }
-    for (size_t i = 0; i < frame->executor->mesh_count; i++)
+    for (size_t i = 0; i < frame->executor->mesh_count; i++) {
+        const bool is_inside_hidden = frame->executor->meshes[i].is_solid && is_seen_from_outside(frame, i);
+        (is_inside_hidden ? glEnable : glDisable)(GL_CULL_FACE);
         render_draw_object(frame, i);
+    }
+    glDisable(GL_CULL_FACE);
     return true;
 }
 

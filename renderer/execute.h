@@ -61,6 +61,11 @@ void render_set_light_view(GLuint program, const struct render_request *request,
 void render_set_camera(GLuint program, const struct render_plan *plan);
 void render_set_medium(GLuint program, const struct render_plan *plan);
 
+/* Where the points of pixels are, and the rays through them (common/points.glsl); the camera, too. The
+ * places are those of the framebuffer that they were found with. */
+void render_executor_find_points(const struct render_frame *frame);
+void render_set_points(const struct render_frame *frame);
+
 /* Say that a draw call was made. Functions that draw by themselves call it. */
 void render_count_draw(const struct render_frame *frame);
 
@@ -85,6 +90,9 @@ DIPOLE_CHECKED bool render_executor_need_tsm(const struct render_frame *frame, s
 
 /* What was made; NULL before. */
 struct render_tsm *render_executor_tsm(const struct render_executor *executor);
+
+/* The triangles of all objects, for common/points.glsl; handed on as mesh_triangles and so on. */
+DIPOLE_CHECKED bool render_executor_use_meshes(const struct render_frame *frame, dipole_status *status);
 
 /* What each object is made of, for common/medium.glsl; handed on as object_media. */
 DIPOLE_CHECKED bool render_executor_fill_media(const struct render_frame *frame, dipole_status *status);

@@ -1,9 +1,12 @@
 #include "renderer/light_samples.h"
 
+#include "lutgen/parallel.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Extents are measured on float positions: a patch exactly as wide as the spacing must not be split. */
 #define EXTENT_SLACK 1e-4
@@ -217,14 +220,151 @@ static bool reduce_quadrant(struct reducer *reducer, int x, int y, int size)
            reduce_quadrant(reducer, x + half, y + half, half);
 }
 
+/* ---- threads ------------------------------------------------------------------------------------ */
+
+/* Subtrees of the quadtree, one after the other as the walk meets them: each is a round of the loop, and
+ * has lists of its own, put behind each other at the end. So the order is that of one thread. */
+enum { PART_LEVELS = 3, PART_COUNT = 1 << 2 * PART_LEVELS };
+
+struct part {
+    struct render_light_target *targets;
+    struct render_light_samples *lists; /* of each list that some target has */
+    dipole_status status;
+    bool is_done;
+};
+
+struct parts {
+    const struct render_light_view *view;
+    int size; /* of the whole quadtree */
+    struct part at[PART_COUNT];
+};
+
+/* Every other bit, from the lowest on: a place on the Z-order curve to its x. */
+static int every_other_bit(int code)
+{
+    int value = 0;
+    for (int bit = 0; bit < PART_LEVELS; bit++)
+        value |= (code >> 2 * bit & 1) << bit;
+    return value;
+}
+
+static void reduce_part(void *context, int index)
+{
+    struct parts *const parts = context;
+    struct part *const part = &parts->at[index];
+    struct reducer reducer = { .targets = part->targets, .view = parts->view, .status = &part->status };
+    const int size = parts->size >> PART_LEVELS;
+    part->is_done =
+        reduce_quadrant(&reducer, every_other_bit(index) * size, every_other_bit(index >> 1) * size, size);
+}
+
+static bool append_all(struct render_light_samples *samples, const struct render_light_samples *more,
+                       dipole_status *status)
+{
+    if (more->count == 0)
+        return true;
+    if (samples->capacity - samples->count < more->count) {
+        const size_t capacity = samples->count + more->count + samples->capacity / 2;
+        struct render_light_sample *const grown = realloc(samples->samples, capacity * sizeof *grown);
+        if (!grown)
+            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
+                               capacity);
+        samples->samples = grown;
+        samples->capacity = capacity;
+    }
+    memcpy(samples->samples + samples->count, more->samples, more->count * sizeof *more->samples);
+    samples->count += more->count;
+    return true;
+}
+
+/* Which targets share a list: numbers of the lists, and the lists; returns how many. */
+static size_t number_lists(const struct render_light_target *targets, size_t target_count, size_t *numbers,
+                           struct render_light_samples **lists)
+{
+    size_t list_count = 0;
+    for (size_t i = 0; i < target_count; i++) {
+        size_t k = 0;
+        while (k < list_count && lists[k] != targets[i].samples)
+            k++;
+        if (k == list_count)
+            lists[list_count++] = targets[i].samples;
+        numbers[i] = k;
+    }
+    return list_count;
+}
+
+/* How many targets there are: as many as the view's objects say. */
+static size_t count_targets(const struct render_light_view *view)
+{
+    float most = 1;
+    const size_t texel_count = (size_t)view->size_px * (size_t)view->size_px;
+    for (size_t i = 0; view->objects && i < texel_count; i++)
+        most = fmaxf(most, view->texels[4 * i + 3] > 0 ? view->objects[i] : 0);
+    return (size_t)most;
+}
+
+/* Lists and targets of the parts in two allocations; false: no memory. */
+static bool parts_init(struct parts *parts, const struct render_light_target *targets, size_t target_count,
+                       const size_t *numbers, size_t list_count)
+{
+    parts->at[0].targets = calloc(PART_COUNT * target_count, sizeof *parts->at[0].targets);
+    parts->at[0].lists = calloc(PART_COUNT * list_count, sizeof *parts->at[0].lists);
+    if (!parts->at[0].targets || !parts->at[0].lists)
+        return false;
+    for (size_t p = 0; p < PART_COUNT; p++) {
+        struct part *const part = &parts->at[p];
+        part->targets = parts->at[0].targets + p * target_count;
+        part->lists = parts->at[0].lists + p * list_count;
+        for (size_t i = 0; i < target_count; i++) {
+            part->targets[i] = targets[i];
+            if (targets[i].samples)
+                part->targets[i].samples = &part->lists[numbers[i]];
+        }
+    }
+    return true;
+}
+
+static bool parts_join(const struct parts *parts, struct render_light_samples *const *lists,
+                       size_t list_count, dipole_status *status)
+{
+    bool done = true;
+    for (size_t p = 0; done && p < PART_COUNT; p++) {
+        const struct part *const part = &parts->at[p];
+        if (!part->is_done && status)
+            *status = part->status;
+        done = part->is_done;
+        for (size_t k = 0; done && k < list_count; k++)
+            done = !lists[k] || append_all(lists[k], &part->lists[k], status);
+    }
+    return done;
+}
+
 bool render_light_samples_append(const struct render_light_target *targets,
                                  const struct render_light_view *view, dipole_status *status)
 {
-    struct reducer reducer = { .targets = targets, .view = view, .status = status };
-    int size = 1;
-    while (size < view->size_px)
-        size *= 2;
-    return reduce_quadrant(&reducer, 0, 0, size);
+    const size_t target_count = count_targets(view);
+    struct parts parts = { .view = view, .size = 1 };
+    size_t *const numbers = calloc(target_count, sizeof *numbers);
+    struct render_light_samples **const lists = calloc(target_count, sizeof(struct render_light_samples *));
+    while (parts.size < view->size_px || parts.size < 1 << (view->levels + PART_LEVELS))
+        parts.size *= 2;
+    size_t list_count = 0;
+    if (numbers && lists)
+        list_count = number_lists(targets, target_count, numbers, lists);
+    bool done = list_count > 0 && parts_init(&parts, targets, target_count, numbers, list_count);
+    if (done) {
+        lut_parallel_for(PART_COUNT, 0, reduce_part, &parts);
+        done = parts_join(&parts, lists, list_count, status);
+    } else {
+        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to sample %zu objects", target_count);
+    }
+    for (size_t k = 0; parts.at[0].lists && k < PART_COUNT * list_count; k++)
+        render_light_samples_destroy(&parts.at[0].lists[k]);
+    free(parts.at[0].lists);
+    free(parts.at[0].targets);
+    free(numbers);
+    free((void *)lists);
+    return done;
 }
 
 /* ---- merging ------------------------------------------------------------------------------------ */
@@ -257,15 +397,45 @@ static uint64_t cube_code(const struct render_light_sample *sample, const double
     return code;
 }
 
-/* By object, code, then index: the same order everywhere. */
-static int compare_keys(const void *a, const void *b)
+/* By object, then code; equal ones stay in their order. Digits in which all keys are alike are left out. */
+enum { DIGIT_BITS = 11, DIGIT_COUNT = 1 << DIGIT_BITS };
+
+static size_t digit_of(const struct key *key, int shift)
 {
-    const struct key *const x = a, *const y = b;
-    if (x->object != y->object)
-        return x->object < y->object ? -1 : 1;
-    if (x->code != y->code)
-        return x->code < y->code ? -1 : 1;
-    return x->index < y->index ? -1 : x->index > y->index;
+    return (size_t)((shift < 64 ? key->code : (uint64_t)key->object) >> shift % 64) & (DIGIT_COUNT - 1);
+}
+
+/* Sort by one digit; false: there is nothing to do. */
+static bool sort_digit(const struct key *keys, size_t count, int shift, struct key *sorted)
+{
+    size_t starts[DIGIT_COUNT] = { 0 };
+    for (size_t i = 0; i < count; i++)
+        starts[digit_of(&keys[i], shift)]++;
+    if (starts[digit_of(&keys[0], shift)] == count)
+        return false;
+    size_t sum = 0;
+    for (size_t d = 0; d < DIGIT_COUNT; d++) {
+        const size_t here = starts[d];
+        starts[d] = sum;
+        sum += here;
+    }
+    for (size_t i = 0; i < count; i++)
+        sorted[starts[digit_of(&keys[i], shift)]++] = keys[i];
+    return true;
+}
+
+/* Both hold count keys; returns the one that is sorted. */
+static struct key *sort_keys(struct key *keys, struct key *spare, size_t count)
+{
+    static const int shifts[] = { 0, 11, 22, 33, 44, 55, 64, 75, 86 };
+    for (size_t s = 0; s < sizeof shifts / sizeof *shifts; s++) {
+        if (!sort_digit(keys, count, shifts[s], spare))
+            continue;
+        struct key *const sorted = spare;
+        spare = keys;
+        keys = sorted;
+    }
+    return keys;
 }
 
 /* Brightness, whatever the colour: what a mean position is weighted by. */
@@ -309,8 +479,9 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
     const size_t count = samples->count;
     if (count == 0)
         return true;
-    struct key *const keys = malloc(count * sizeof *keys);
-    if (!keys)
+    struct key *const unsorted =
+        count > SIZE_MAX / 2 / sizeof *unsorted ? NULL : malloc(2 * count * sizeof *unsorted);
+    if (!unsorted)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to merge %zu light samples",
                            count);
     double min_mm[3] = { INFINITY, INFINITY, INFINITY };
@@ -319,10 +490,10 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
             min_mm[k] = fmin(min_mm[k], (double)samples->samples[i].position_mm[k]);
     }
     for (size_t i = 0; i < count; i++)
-        keys[i] = (struct key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm),
-                                .index = i,
-                                .object = samples->samples[i].object };
-    qsort(keys, count, sizeof *keys, compare_keys);
+        unsorted[i] = (struct key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm),
+                                    .index = i,
+                                    .object = samples->samples[i].object };
+    const struct key *const keys = sort_keys(unsorted, unsorted + count, count);
     bool done = true;
     for (size_t first = 0, end; done && first < count; first = end) {
         end = first + 1;
@@ -331,7 +502,7 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
         const struct render_light_sample sample = merge_run(samples, keys + first, end - first);
         done = append(merged, &sample, status);
     }
-    free(keys);
+    free(unsorted);
     return done;
 }
 

@@ -33,7 +33,7 @@ enum render_draw_kind {
     RENDER_DRAW_NOTHING,    /* the pass's run function needs no targets        */
 };
 
-enum { RENDER_PASS_READS = 8, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 2, RENDER_PASS_TARGETS = 6 };
+enum { RENDER_PASS_READS = 10, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 2, RENDER_PASS_TARGETS = 6 };
 
 /* One row of an effect. Names of textures are those of the table in plan.c. */
 struct render_pass {
@@ -79,7 +79,7 @@ struct render_decision render_called_for(const char *format, ...) DIPOLE_PRINTF(
 struct render_decision render_not_called_for(const char *format, ...) DIPOLE_PRINTF(1, 2);
 
 /* OTHER: kept by its pass, which says how to bind it. */
-enum render_format { RENDER_RGBA32F = 0, RENDER_R32F, RENDER_DEPTH32F, RENDER_OTHER };
+enum render_format { RENDER_RGBA32F = 0, RENDER_R32F, RENDER_R32UI, RENDER_DEPTH32F, RENDER_OTHER };
 enum render_size { RENDER_SIZE_FRAME = 0, RENDER_SIZE_LIGHT_VIEW, RENDER_SIZE_MAP, RENDER_SIZE_VERTICES };
 
 /* Width of textures with a texel for each vertex of the scene. */

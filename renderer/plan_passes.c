@@ -9,11 +9,16 @@
 
 /* Every texture of the renderer. */
 static const struct render_texture textures[] = {
-    { .name = "surface_position_mm", .is_multisampled = true }, /* xyz; w = object + 1             */
-    { .name = "surface_normal", .is_multisampled = true },      /* xyz; w = roughness, 0: no gloss  */
+    { .name = "mesh_triangles", .format = RENDER_OTHER },    /* corners; w = object + 1             */
+    { .name = "mesh_positions_mm", .format = RENDER_OTHER }, /* of all vertices                     */
+    { .name = "mesh_normals", .format = RENDER_OTHER },
+    { .name = "mesh_roughness", .format = RENDER_OTHER }, /* of each object, 0: no gloss         */
+    { .name = "surface_triangle", .format = RENDER_R32UI, .is_multisampled = true }, /* from 1; 0: none */
     { .name = "surface_depth", .format = RENDER_DEPTH32F, .is_multisampled = true },
-    { .name = "position_mm" }, /* one point of the surface per pixel, w = object + 1                */
-    { .name = "normal" },
+    { .name = "position_mm" },  /* one point of the surface per pixel, w = object + 1               */
+    { .name = "normal" },       /* w = roughness, 0: no gloss                                       */
+    { .name = "surface_exit" }, /* exit per sr, covered part, part that shows this surface; points that do
+                                   not */
     { .name = "position_depth", .format = RENDER_DEPTH32F }, /* 0 where no object is                */
     { .name = "object_media", .format = RENDER_OTHER },      /* what each object is made of              */
     { .name = "light_view", .size = RENDER_SIZE_LIGHT_VIEW, .is_far_where_empty = true },

@@ -41,7 +41,7 @@ extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 /* Tone mapping leaves pixels alone whose largest channel is up to this, times 2^exposure_ev. T20 */
 #define RENDER_TONE_KNEE 0.6
 
-/* Largest picture: sides and pixels (a pixel takes about 230 bytes while it is drawn). */
+/* Largest picture: sides and pixels (a pixel takes about 180 bytes while it is drawn). */
 enum { RENDER_SIDE_LIMIT = 16384 };
 #define RENDER_PIXEL_LIMIT ((size_t)1 << 24)
 

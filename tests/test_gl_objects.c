@@ -16,6 +16,7 @@ static const struct kept {
     size_t texture_count, buffer_count, vertex_array_count;
     bool is_per_medium;
 } kept_by_effects[] = {
+    { .effect = "surface", .texture_count = 1, .buffer_count = 1 },    /* the objects' gloss           */
     { .effect = "object_ids", .texture_count = 1, .buffer_count = 1 }, /* the media                     */
     { .effect = "light_samples", .vertex_array_count = 1 },            /* of the splats                 */
     { .effect = "splat", .texture_count = 2, .buffer_count = 3 },      /* samples, profiles; and splats */
@@ -74,7 +75,10 @@ static bool is_new_texture(const struct render_plan *plan, size_t index, const c
 
 static struct counts expected_counts(const struct render_plan *plan, size_t object_count)
 {
-    struct counts counts = { .buffers = 3 * object_count, .vertex_arrays = object_count + 1 };
+    /* indices of each object; vertices and triangles of all, which are textures, too */
+    struct counts counts = { .buffers = object_count + 3,
+                             .textures = 3,
+                             .vertex_arrays = object_count + 1 };
     for (size_t i = 0; i < plan->pass_count; i++) {
         const struct render_pass *const pass = plan->passes[i].pass;
         const char *writes[RENDER_PASS_TARGETS + 1];

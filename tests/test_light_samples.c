@@ -189,6 +189,69 @@ static void merging_conserves_flux_and_bounds_the_count(void **state)
     render_light_samples_destroy(&merged);
 }
 
+/* Oracle: all pairs. Of each object and cube there is one sample; objects come one after the other. */
+static void merging_leaves_one_sample_for_each_cube(void **state)
+{
+    (void)state;
+    enum { COUNT = 3000 };
+    static struct render_light_sample rows[COUNT];
+    struct rng rng = { .seed = 11 };
+    for (int i = 0; i < COUNT; i++) {
+        for (int k = 0; k < 3; k++) {
+            rows[i].position_mm[k] = (float)uniform(&rng, 0, i == 0 ? 0 : 40);
+            rows[i].flux_w[k] = 1;
+        }
+        rows[i].object = (float)floor(uniform(&rng, 0, 5000)); /* more than a digit of the sort */
+        rows[i].object = i % 3 ? 2 : rows[i].object;
+    }
+    size_t expected = 0;
+    for (int i = 0; i < COUNT; i++) {
+        bool is_first = true;
+        for (int j = 0; j < i && is_first; j++) {
+            bool is_same = rows[i].object == rows[j].object;
+            for (int k = 0; k < 3; k++)
+                is_same = is_same && floor((double)rows[i].position_mm[k] / 4) ==
+                                         floor((double)rows[j].position_mm[k] / 4);
+            is_first = !is_same;
+        }
+        expected += is_first;
+    }
+    const struct render_light_samples all = { .samples = rows, .count = COUNT };
+    struct render_light_samples merged = { 0 };
+    assert_true(render_light_samples_merge(&all, 4, &merged, NULL));
+    assert_int_equal(merged.count, expected);
+    for (size_t i = 1; i < merged.count; i++)
+        assert_true(merged.samples[i].object >= merged.samples[i - 1].object);
+    render_light_samples_destroy(&merged);
+}
+
+/* Oracle: one view is as good as another: a view's samples are those of its quarters, one after the other,
+ * as its quadtree has them, on however many threads. */
+static void quarters_come_one_after_the_other(void **state)
+{
+    (void)state;
+    enum { HALF = SIDE / 2 };
+    static float texels[4 * SIDE * SIDE], quarter[4 * HALF * HALF];
+    fill_plane(texels, 1.7, -0.4);
+    struct render_light_samples whole = reduce(texels, 0.8), parts = { 0 };
+    for (int q = 0; q < 4; q++) {
+        for (int y = 0; y < HALF; y++)
+            memcpy(quarter + 4 * y * HALF, texels + 4 * ((y + q / 2 * HALF) * SIDE + q % 2 * HALF),
+                   4 * HALF * sizeof *texels);
+        const struct render_light_view view = { .texels = quarter,
+                                                .size_px = HALF,
+                                                .forward = { 0, 0, -1 },
+                                                .rgb = { 1, 2, 4 },
+                                                .levels = LEVELS };
+        const struct render_light_target target = { &parts, 0.8 };
+        assert_true(render_light_samples_append(&target, &view, NULL));
+    }
+    assert_int_equal(whole.count, parts.count);
+    assert_memory_equal(whole.samples, parts.samples, whole.count * sizeof *whole.samples);
+    render_light_samples_destroy(&whole);
+    render_light_samples_destroy(&parts);
+}
+
 /* Oracle: no surface, no samples. */
 static void an_empty_view_gives_none(void **state)
 {
@@ -211,6 +274,8 @@ int main(void)
         cmocka_unit_test(patches_are_no_wider_than_the_spacing),
         cmocka_unit_test(a_jump_is_not_bridged),
         cmocka_unit_test(merging_conserves_flux_and_bounds_the_count),
+        cmocka_unit_test(merging_leaves_one_sample_for_each_cube),
+        cmocka_unit_test(quarters_come_one_after_the_other),
         cmocka_unit_test(an_empty_view_gives_none),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

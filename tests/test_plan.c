@@ -94,7 +94,7 @@ static void a_dark_scene_needs_no_light_passes(void **state)
     const struct render_request request = request_for(&test);
     struct render_plan *const plan = plan_for(&request);
     assert_int_equal(plan->view_count, 0);
-    assert_int_equal(plan->pass_count, 3); /* surface, surface_resolve, composite */
+    assert_int_equal(plan->pass_count, 5); /* of the surface four, composite */
     assert_false(is_active(plan, "splat"));
     render_plan_destroy(plan);
     scene_end(&test);
@@ -192,13 +192,14 @@ static void passes_per_view_are_repeated_together(void **state)
     test.objects[0].has_specular = true;
     const struct render_request request = request_for(&test);
     struct render_plan *const plan = plan_for(&request);
-    static const char *const names[] = { "surface",  "surface_resolve", "light_view",    "light_samples",
-                                         "specular", "light_view",      "light_samples", "specular",
-                                         "splat",    "composite" };
+    static const char *const names[] = { "surface_meshes",  "surface",    "position_depth",
+                                         "surface_resolve", "light_view", "light_samples",
+                                         "specular",        "light_view", "light_samples",
+                                         "specular",        "splat",      "composite" };
     assert_int_equal(plan->pass_count, sizeof names / sizeof *names);
     for (size_t i = 0; i < plan->pass_count; i++) {
         assert_string_equal(plan->passes[i].pass->name, names[i]);
-        assert_int_equal(plan->passes[i].view, i >= 5 && i < 8);
+        assert_int_equal(plan->passes[i].view, i >= 7 && i < 10);
     }
     render_plan_destroy(plan);
     scene_end(&test);

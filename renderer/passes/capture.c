@@ -14,22 +14,24 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_POINTS_PIXEL, render_cost_pixels(plan)) +
+    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
            render_cost_ms(RENDER_COST_COMPOSITE_PIXEL, plan->covered_px);
 }
 
 static void bind(const struct render_frame *frame)
 {
-    render_set_camera(frame->program, frame->plan);
+    render_set_points(frame);
     render_set_medium(frame->program, frame->plan);
 }
 
 static const struct render_pass passes[] = {
     { .name = "capture",
       .draw = RENDER_DRAW_FULLSCREEN,
-      .reads = { "surface_position_mm", "surface_normal", "position_mm", "normal" },
+      .reads = { "surface_triangle", "mesh_triangles", "mesh_positions_mm", "mesh_normals",
+                 "surface_exit" },
       .reads_if_written = { "object_media" },
       .writes = { "capture" },
+      .depth_tested = "position_depth",
       .bind = bind },
 };
 

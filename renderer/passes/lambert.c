@@ -43,6 +43,7 @@ static const struct render_pass passes[] = {
       .reads = { "position_mm", "normal", "light_view" },
       .reads_if_written = { "object_media" },
       .writes = { "radiosity" },
+      .depth_tested = "position_depth",
       .bind = bind },
 };
 

@@ -18,14 +18,14 @@ static struct render_decision decide(const struct render_request *request, const
 static double cost_ms(const struct render_plan *plan)
 {
     return RENDER_COST_PROGRAM_MS +
-           (double)plan->view_count * (render_cost_ms(RENDER_COST_POINTS_PIXEL, render_cost_pixels(plan)) +
-                                       render_cost_ms(RENDER_COST_SHADOW_PIXEL, plan->covered_px));
+           (double)plan->view_count * (render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+                                       render_cost_ms(RENDER_COST_GLOSS_PIXEL, plan->covered_px));
 }
 
 static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
-    render_set_camera(frame->program, frame->plan);
+    render_set_points(frame);
     render_set_medium(frame->program, frame->plan);
 }
 
@@ -34,9 +34,11 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_FULLSCREEN,
       .is_per_view = true,
       .is_added = true,
-      .reads = { "surface_position_mm", "surface_normal", "light_view" },
+      .reads = { "surface_triangle", "mesh_triangles", "mesh_positions_mm", "mesh_normals",
+                 "mesh_roughness", "position_mm", "normal", "surface_exit", "light_view" },
       .reads_if_written = { "object_media" },
       .writes = { "specular" },
+      .depth_tested = "position_depth",
       .bind = bind },
 };
 

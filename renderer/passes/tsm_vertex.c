@@ -24,7 +24,7 @@ static double cost_ms(const struct render_plan *plan)
     return 3 * RENDER_COST_PROGRAM_MS +
            render_cost_map_samples_ms(plan, (double)plan->vertex_count * (double)plan->map_count) +
            render_cost_ms(RENDER_COST_TRIANGLE_4, (double)plan->triangle_count) +
-           render_cost_ms(RENDER_COST_SURFACE_PIXEL, render_cost_pixels(plan));
+           render_cost_ms(RENDER_COST_POINTS_PIXEL, render_cost_pixels(plan));
 }
 
 /* Nothing bounds what so few samples make of an arbitrary shape. */
@@ -47,7 +47,7 @@ static void bind_interpolate(const struct render_frame *frame)
 
 static void bind_resolve(const struct render_frame *frame)
 {
-    render_set_camera(frame->program, frame->plan);
+    render_set_points(frame);
 }
 
 static const struct render_pass passes[] = {
@@ -74,8 +74,8 @@ static const struct render_pass passes[] = {
     { .name = "tsm_resolve",
       .draw = RENDER_DRAW_FULLSCREEN,
       .is_added = true,
-      .reads = { "surface_position_mm", "surface_normal", "tsm_surface_radiosity", "position_mm",
-                 "normal" },
+      .reads = { "surface_triangle", "mesh_triangles", "mesh_positions_mm", "mesh_normals",
+                 "tsm_surface_radiosity", "position_mm", "normal" },
       .writes = { "radiosity" },
       .bind = bind_resolve },
 };

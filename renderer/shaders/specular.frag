@@ -1,11 +1,13 @@
 // Pass specular: radiance += light mirrored at the rough surface (theory.md T19), of one light's view,
-// averaged over the pixel's four points.
+// averaged over the pixel's four points: those that show its surface are shaded once where they are nearly level
+// (theory.md T58).
 #include "common/light.glsl"
 #include "common/fresnel.glsl"
 #include "common/medium.glsl"
-uniform sampler2DMS surface_position_mm;
-uniform sampler2DMS surface_normal;
-uniform vec4 eye;   // w = 1: position, mm; w = 0: direction toward the eye
+#include "common/points.glsl"
+uniform sampler2D position_mm;
+uniform sampler2D normal;
+uniform sampler2D surface_exit;
 layout(location = 0) out vec4 radiance;
 
 // f cosine of GGX with the height-correlated Smith term; alpha: roughness.
@@ -19,32 +21,39 @@ float ggx(float alpha, float cosine_normal_half, float cosine_in, float cosine_o
     return distribution * 0.5 * cosine_in / max(smith_in + smith_out, 1e-30);
 }
 
-vec3 specular_at(vec4 position_ws_mm, vec4 normal_and_roughness)
+// Toward the eye for an irradiance of 1 on a facing surface, in full light.
+float mirrored(surface_point point, float roughness)
 {
-    vec3 normal_ws = normal_and_roughness.xyz;
+    vec4 position_ws_mm = point.position_mm;
+    vec3 normal_ws = point.normal;
     vec3 to_light = toward(light, position_ws_mm.xyz), to_eye = toward(eye, position_ws_mm.xyz);
     float cosine_in = dot(normal_ws, to_light), cosine_out = dot(normal_ws, to_eye);
-    if (normal_and_roughness.w <= 0.0 || cosine_in <= 0.0 || cosine_out <= 0.0)
-        return vec3(0.0);
+    if (roughness <= 0.0 || cosine_in <= 0.0 || cosine_out <= 0.0)
+        return 0.0;
     vec3 middle = unit_or(to_light + to_eye, normal_ws);
     float reflectance = fresnel_reflectance(medium_eta(position_ws_mm.w), clamp(dot(to_light, middle), 0.0, 1.0));
-    float lobe = ggx(normal_and_roughness.w, dot(normal_ws, middle), cosine_in, cosine_out);
-    return light_irradiance(position_ws_mm.xyz) * reflectance * lobe *
-           light_visibility(position_ws_mm.xyz, normal_ws);
+    return reflectance * ggx(roughness, dot(normal_ws, middle), cosine_in, cosine_out);
 }
 
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec4 first_mm = texelFetch(surface_position_mm, pixel, 0);
-    vec3 first = first_mm.w > 0.0 ? specular_at(first_mm, texelFetch(surface_normal, pixel, 0)) : vec3(0.0);
-    vec3 sum = first;
-    for (int i = 1; i < 4; i++) {
-        vec4 point_mm = texelFetch(surface_position_mm, pixel, i);
-        if (point_mm == first_mm)
-            sum += first;
-        else if (point_mm.w > 0.0)
-            sum += specular_at(point_mm, texelFetch(surface_normal, pixel, i));
+    vec4 here_normal = texelFetch(normal, pixel, 0), exit = texelFetch(surface_exit, pixel, 0);
+    surface_point point = surface_point(texelFetch(position_mm, pixel, 0), here_normal.xyz);
+    uint rest = uint(exit.w);
+    // The pixel's surface counts for all the points that show it, unless gloss differs among them.
+    float weight = rest < 16u ? exit.z : 0.0, roughness = here_normal.w;
+    rest = rest < 16u ? rest : 15u;
+    vec3 sum = vec3(0.0);
+    while (true) {
+        sum += weight * mirrored(point, roughness) * light_irradiance(point.position_mm.xyz) *
+               light_visibility(point.position_mm.xyz, point.normal);
+        if (rest == 0u)
+            break;
+        point = point_of_pixel(pixel, findLSB(rest));
+        roughness = texelFetch(mesh_roughness, max(int(point.position_mm.w) - 1, 0)).r;
+        weight = 0.25;
+        rest &= rest - 1u;
     }
-    radiance = vec4(sum / 4.0, 0.0);
+    radiance = vec4(sum, 0.0);
 }

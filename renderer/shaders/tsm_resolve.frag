@@ -1,12 +1,11 @@
 // Pass tsm_resolve: radiosity += the mean over those of a pixel's points that show the same surface as the pixel's
 // own.
+#include "common/direction.glsl"
+#include "common/points.glsl"
 #include "common/same_surface.glsl"
-uniform sampler2DMS surface_position_mm;
-uniform sampler2DMS surface_normal;
 uniform sampler2DMS tsm_surface_radiosity;
 uniform sampler2D position_mm;
 uniform sampler2D normal;
-uniform vec4 eye;        // w = 1: position, mm; w = 0: direction toward the eye
 uniform float pixel_mm;  // size of a pixel; perspective: at distance 1
 layout(location = 0) out vec4 radiosity_w_per_mm2;
 
@@ -21,9 +20,9 @@ void main()
     float count = 0.0;
     for (int i = 0; i < 4; i++) {
         vec4 radiosity = texelFetch(tsm_surface_radiosity, pixel, i);
-        if (radiosity.w == here_mm.w &&
-            is_same_surface(texelFetch(surface_position_mm, pixel, i), texelFetch(surface_normal, pixel, i).xyz, here_mm,
-                            here_normal, footprint_mm(eye, pixel_mm, here_mm.xyz))) {
+        surface_point point = point_of_pixel(pixel, i);
+        if (radiosity.w == here_mm.w && is_same_surface(point.position_mm, point.normal, here_mm, here_normal,
+                                                        footprint_mm(eye, pixel_mm, here_mm.xyz))) {
             sum += radiosity.rgb;
             count += 1.0;
         }
