@@ -10,7 +10,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { LIGHT_LIMIT = 64, OBJECT_LIMIT = 1024, DEFAULT_DETAIL = 128 };
+enum { OBJECT_LIMIT = 1024, DEFAULT_DETAIL = 128 };
 
 static const double POWER_MAX = 1e12;
 
@@ -66,8 +66,8 @@ static bool read_brightness(const struct io_json *at, const char *key, struct io
     return !light->is_stated || io_scene_get_rgb(at, key, light->rgb, status);
 }
 
-static bool read_light(const struct io_json *at, double unit_mm, struct io_light *light,
-                       dipole_status *status)
+bool io_scene_read_light(const struct io_json *at, double unit_mm, struct io_light *light,
+                         dipole_status *status)
 {
     static const char *const kinds[] = {
         [IO_LIGHT_DIRECTIONAL] = "directional", [IO_LIGHT_POINT] = "point", NULL
@@ -172,8 +172,8 @@ static bool read_bundled_material(const struct io_json *at, struct io_material *
     return io_material_read(path, material, status);
 }
 
-static bool read_material(const struct io_json *at, const struct io_scene_options *options,
-                          struct io_material *material, dipole_status *status)
+bool io_scene_read_material(const struct io_json *at, const struct io_scene_options *options,
+                            struct io_material *material, dipole_status *status)
 {
     char path[PATH_MAX];
     const char *text = json_string_value(at->value);
@@ -192,7 +192,7 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
     const struct io_json material = io_json_member(at, "material"),
                          transform_at = io_json_member(at, "transform");
     struct io_scene_transform transform;
-    *object = (struct io_object){ .roughness = 0.3, .has_specular = true };
+    *object = (struct io_object){ .roughness = IO_SCENE_ROUGHNESS, .has_specular = true };
     if (!io_json_check_object(at, known, 1, status))
         return false;
     /* An object without a name goes by its shape. */
@@ -204,7 +204,7 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
            io_json_get_number(at, "roughness", 0.05, 1, &object->roughness, status) &&
            io_json_get_bool(at, "specular", &object->has_specular, status) &&
            io_scene_read_transform(&transform_at, &transform, status) &&
-           read_material(&material, options, &object->material, status) &&
+           io_scene_read_material(&material, options, &object->material, status) &&
            read_shape(at, options, &object->mesh, status) &&
            io_scene_place_mesh(at, &transform, unit_mm, object->mesh, status);
 }
@@ -254,14 +254,14 @@ static bool read_lights(const struct io_json *at, double unit_mm, struct io_scen
                         dipole_status *status)
 {
     size_t count;
-    if (!io_json_check_array(at, scene->has_environment ? 0 : 1, LIGHT_LIMIT, &count, status))
+    if (!io_json_check_array(at, scene->has_environment ? 0 : 1, IO_SCENE_LIGHT_LIMIT, &count, status))
         return false;
     scene->lights = count > 0 ? calloc(count, sizeof *scene->lights) : NULL;
     if (count > 0 && !scene->lights)
         return io_json_fail(at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
     for (; scene->light_count < count; scene->light_count++) {
         const struct io_json light = io_json_element(at, scene->light_count);
-        if (!read_light(&light, unit_mm, &scene->lights[scene->light_count], status))
+        if (!io_scene_read_light(&light, unit_mm, &scene->lights[scene->light_count], status))
             return false;
     }
     return true;

@@ -24,6 +24,8 @@ struct io_camera {
     int width_px, height_px;
 };
 
+enum { IO_SCENE_LIGHT_LIMIT = 64 };
+
 /* Light from all around: a picture of radiance by direction. The picture itself is not read here. */
 struct io_environment {
     char path[4096];   /* of an EXR or HDR file, resolved; it exists      */
@@ -80,6 +82,22 @@ DIPOLE_CHECKED bool io_scene_read(const char *path, const struct io_scene_option
  * about y through the target.
  */
 void io_scene_set_frame(struct io_scene *scene, int frame);
+
+/* Add a light, or take one away, also of what frames are made of. Adding fails with DIPOLE_BAD_VALUE beyond
+ * IO_SCENE_LIGHT_LIMIT, or DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool io_scene_add_light(struct io_scene *scene, const struct io_light *light,
+                                       dipole_status *status);
+void io_scene_remove_light(struct io_scene *scene, size_t index);
+
+/*
+ * Write the scene as it stands: the file that it was read from, with these options, and in it what has
+ * changed since: camera, lights, scale and turn of the environment, exposure, materials, roughness and
+ * gloss. All else stays as it was; a changed material stands in the scene itself, with coefficients. Fails
+ * as io_file_write and the reading of a scene do; with DIPOLE_BAD_VALUE also where the file has other
+ * objects by now, or names files by relative paths and path is not in its folder.
+ */
+DIPOLE_CHECKED bool io_scene_write(const struct io_scene *scene, const struct io_scene_options *options,
+                                   const char *path, dipole_status *status);
 
 void io_scene_destroy(struct io_scene *scene);
 

@@ -10,6 +10,9 @@
 #define IO_SCENE_LENGTH_MIN 1e-6
 #define IO_SCENE_LENGTH_MAX 1e6
 
+/* Roughness of an object that states none. */
+#define IO_SCENE_ROUGHNESS 0.3
+
 #define IO_SCENE_RAD_PER_DEG (3.14159265358979323846 / 180)
 
 /* False for a vector that is too short to have a direction. */
@@ -26,6 +29,13 @@ DIPOLE_CHECKED bool io_scene_get_rgb(const struct io_json *object, const char *k
 /* Read camera or cameras of the root, all of them, and keep the one of that name; NULL: the first. */
 DIPOLE_CHECKED bool io_scene_read_cameras(const struct io_json *root, const char *name, double unit_mm,
                                           struct io_camera *camera, dipole_status *status);
+
+DIPOLE_CHECKED bool io_scene_read_light(const struct io_json *at, double unit_mm, struct io_light *light,
+                                        dipole_status *status);
+
+/* A bundled material's name, a path, or the material itself. */
+DIPOLE_CHECKED bool io_scene_read_material(const struct io_json *at, const struct io_scene_options *options,
+                                           struct io_material *material, dipole_status *status);
 
 /* Read frames once camera and lights are there. An absent at is one frame. */
 DIPOLE_CHECKED bool io_scene_read_frames(const struct io_json *at, struct io_scene *scene,

@@ -70,6 +70,11 @@ static double now_ms(void)
 
 /* ---- buffers ------------------------------------------------------------------------------------ */
 
+static double roughness_of(const struct io_object *object)
+{
+    return object->has_specular ? object->roughness : 0;
+}
+
 static void mesh_create(struct mesh *mesh, const struct io_object *object,
                         const struct render_geometry *geometry)
 {
@@ -87,7 +92,7 @@ static void mesh_create(struct mesh *mesh, const struct io_object *object,
                          source->indices, 0);
     glVertexArrayElementBuffer(mesh->vertex_array, mesh->index_buffer);
     mesh->index_count = (GLsizei)(source->triangle_count * 3);
-    mesh->roughness = object->has_specular ? object->roughness : 0;
+    mesh->roughness = roughness_of(object);
 }
 
 static bool meshes_create(struct render_executor *executor, const struct io_scene *scene,
@@ -160,6 +165,17 @@ void render_executor_destroy(struct render_executor *executor)
     glDeleteVertexArrays(1, &executor->empty_vertex_array);
     free(executor->meshes);
     free(executor);
+}
+
+void render_executor_renew_materials(struct render_executor *executor, const struct io_scene *scene)
+{
+    for (size_t i = 0; i < executor->mesh_count; i++)
+        executor->meshes[i].roughness = roughness_of(&scene->objects[i]);
+    /* Both know their tables by address, where others may come to lie. */
+    render_splatter_destroy(executor->splatter);
+    render_tsm_destroy(executor->tsm);
+    executor->splatter = NULL;
+    executor->tsm = NULL;
 }
 
 /* ---- programs ----------------------------------------------------------------------------------- */

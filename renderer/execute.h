@@ -26,6 +26,9 @@ DIPOLE_CHECKED bool render_executor_create(const struct io_scene *scene, struct 
                                            struct render_executor **executor_out, dipole_status *status);
 void render_executor_destroy(struct render_executor *executor);
 
+/* Forget what was made of the media, and take the objects' roughness again. Context current. */
+void render_executor_renew_materials(struct render_executor *executor, const struct io_scene *scene);
+
 /*
  * Run the passes in order; time_ms[e] of each effect of the plan is set. tables: one for each medium,
  * needed when the plan splats, else NULL; volumes: the same when it has maps. Fails with

@@ -4,8 +4,8 @@
 #include "renderer/plan.h"
 #include "renderer/reference.h"
 #include "renderer/tables.h"
-#include "renderer/view.h"
 #include "renderer/volumes.h"
+#include "renderer/window/view.h"
 
 #include <jansson.h>
 #include <limits.h>
@@ -30,6 +30,7 @@ struct job {
     const struct cli_tool *tool;
     const struct options *options;
     struct io_scene *scene;
+    const struct io_scene_options *reading; /* of the scene */
     struct renderer *renderer; /* NULL: the reference, without OpenGL: works where there is none */
     struct render_options drawing;
     struct cli_progress progress;
@@ -221,6 +222,7 @@ static bool draw(struct job *job, dipole_status *status)
     const struct options *const options = job->options;
     if (options->is_viewed) {
         const struct render_view_options view = { .drawing = job->drawing,
+                                                  .reading = job->reading,
                                                   .save_path = options->output_path };
         return render_view(job->renderer, job->scene, &view, status);
     }
@@ -286,6 +288,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                                               .height_px = options->size_px[1] };
     struct job job = { .tool = tool,
                        .options = options,
+                       .reading = &reading,
                        .drawing = { .technique = (enum render_technique)options->technique,
                                     .area = (enum render_area)options->area,
                                     .epsilon = options->epsilon,
@@ -456,8 +459,10 @@ int main(int argc, char **argv)
         { .name = "view",
           .kind = CLI_FLAG,
           .target = &options.is_viewed,
-          .help = "Show the scene in a window: left drag turns the camera, right drag the light, the wheel "
-                  "zooms; T changes the technique, R resets, S saves to IMG, Q quits." },
+          .help =
+              "Show the scene in a window with a panel for materials, lights, techniques and their "
+              "differences: left drag turns the camera, right drag the light, the wheel zooms; Tab opens "
+              "the panel, T changes the technique, C compares, R resets, S saves to IMG, Q quits." },
         { .name = NULL },
     };
     const struct cli_tool tool = {

@@ -52,6 +52,23 @@ void render_destroy(struct renderer *renderer)
     free(renderer);
 }
 
+bool render_renew_materials(struct renderer *renderer, dipole_status *status)
+{
+    struct render_media *media = NULL;
+    if (!render_media_create(renderer->scene, &media, status) || !render_make_current(renderer, status)) {
+        render_media_destroy(media);
+        return false;
+    }
+    render_executor_renew_materials(renderer->executor, renderer->scene);
+    render_tables_destroy(renderer->tables);
+    render_volumes_destroy(renderer->volumes);
+    render_media_destroy(renderer->media);
+    renderer->tables = NULL;
+    renderer->volumes = NULL;
+    renderer->media = media;
+    return true;
+}
+
 bool render_make_current(struct renderer *renderer, dipole_status *status)
 {
     /* Functions of one kind of context are not those of another: load them again each time. */

@@ -54,13 +54,20 @@ struct renderer;
 
 /*
  * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
- * and lights may change between calls, its objects may not.
+ * and lights may change between calls, what its objects are made of only as render_renew_materials says.
  * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed) or
  * DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                                   struct renderer **renderer_out, dipole_status *status);
 void render_destroy(struct renderer *renderer);
+
+/*
+ * Take up the materials, roughness and gloss of the scene's objects after any of them changed; tables are
+ * baked anew when a picture first needs them. Fails as render_media_create does: the caller must then put
+ * back the materials that were there, with which the renderer goes on.
+ */
+DIPOLE_CHECKED bool render_renew_materials(struct renderer *renderer, dipole_status *status);
 
 /* Called now and then with the part that is done, 0 to 1, from the thread that draws. */
 struct render_progress {
