@@ -257,6 +257,18 @@ bool read_photo(const char *path, io_photo_coding coding, io_photo_info *info_ou
     return true;
 }
 
+bool read_size(const char *path, int *width_px, int *height_px, dipole_status *status)
+{
+    const dipole_place place = { path, 0, 0 };
+    const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path);
+    if (!input)
+        return dipole_fail(status, DIPOLE_BAD_SYNTAX, &place, "cannot be read as an image: %s",
+                           OIIO::geterror().c_str());
+    *width_px = input->spec().width;
+    *height_px = input->spec().height;
+    return true;
+}
+
 /* Run work; what it throws becomes a status. */
 template <typename Work> bool guarded(const char *path, dipole_status *status, Work work)
 {
@@ -292,6 +304,11 @@ bool io_photo_read(const char *path, io_photo_coding coding, io_photo_info *info
 {
     *image_out = nullptr;
     return guarded(path, status, [&] { return read_photo(path, coding, info_out, image_out, status); });
+}
+
+bool io_photo_size(const char *path, int *width_px, int *height_px, dipole_status *status)
+{
+    return guarded(path, status, [&] { return read_size(path, width_px, height_px, status); });
 }
 
 double io_srgb_from_linear(double linear)

@@ -31,6 +31,9 @@ DIPOLE_CHECKED bool io_photo_read(const char *path, enum io_photo_coding coding,
                                   struct io_photo_info *info_out, struct io_image **image_out,
                                   dipole_status *status);
 
+/* Width and height of a picture of any such format, without its pixels. */
+DIPOLE_CHECKED bool io_photo_size(const char *path, int *width_px, int *height_px, dipole_status *status);
+
 /* The linear value of an sRGB code, 0 to 1, and back (IEC 61966-2-1). */
 double io_linear_from_srgb(double srgb);
 double io_srgb_from_linear(double linear);

@@ -5,38 +5,172 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* 0 to 1 over start..2 start in the squared distance, with two continuous derivatives: in the squared
- * distance it turns more gently where the profile is high, and aliases half as much as in log distance. */
-static double rise(double start_mm, double r_mm)
-{
-    const double ratio = r_mm / start_mm;
-    const double x = fmin(fmax((ratio * ratio - 1) / 3, 0), 1);
-    return x * x * x * (x * (6 * x - 15) + 10);
-}
+#define PI 3.14159265358979323846
 
-int render_bands_make(double spacing_mm, double r_max_mm, double ring_spacings,
+/* ---- layout ------------------------------------------------------------------------------------- */
+
+int render_bands_make(double spacing_mm, double r_max_mm, double cap_spacings,
                       struct render_band bands[RENDER_BAND_LIMIT])
 {
     int count = 0;
-    double start_mm = 0;
     for (bool is_last = false; !is_last; count++) {
-        const double end_mm = count == 0 ? ring_spacings * spacing_mm : 2 * start_mm;
-        is_last = count + 1 == RENDER_BAND_LIMIT || end_mm >= r_max_mm;
-        bands[count] = (struct render_band){ .spacing_mm = ldexp(spacing_mm, count),
-                                             .r_inner_mm = start_mm,
-                                             .r_outer_mm = is_last ? r_max_mm : fmin(2 * end_mm, r_max_mm),
-                                             .rise_mm = start_mm,
-                                             .fall_mm = is_last ? 0 : end_mm };
-        start_mm = end_mm;
+        const double wide_mm = ldexp(spacing_mm, count), cap_mm = cap_spacings * wide_mm;
+        is_last = count + 1 == RENDER_BAND_LIMIT || 2 * cap_mm >= r_max_mm;
+        bands[count] = (struct render_band){ .spacing_mm = wide_mm,
+                                             .cap_mm = count > 0 ? cap_mm : 0,
+                                             .r_outer_mm = is_last ? r_max_mm : 2 * cap_mm };
     }
     return count;
 }
 
-double render_band_weight(const struct render_band *band, double r_mm)
+static bool is_same_band(const struct render_band *a, const struct render_band *b)
 {
-    const double risen = band->rise_mm > 0 ? rise(band->rise_mm, r_mm) : 1;
-    return band->fall_mm > 0 ? risen - rise(band->fall_mm, r_mm) : risen;
+    return a->spacing_mm == b->spacing_mm && a->cap_mm == b->cap_mm && a->r_outer_mm == b->r_outer_mm;
 }
+
+bool render_bands_are_same(const struct render_band_source *a, const struct render_band *a_bands,
+                           int a_count, const struct render_band_source *b,
+                           const struct render_band *b_bands, int b_count)
+{
+    bool is_same = a->table == b->table && a->row == b->row && a->medium == b->medium && a_count == b_count;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        is_same = is_same && a->blur_mm[c] == b->blur_mm[c];
+    for (int i = 0; is_same && i < a_count; i++)
+        is_same = is_same_band(&a_bands[i], &b_bands[i]);
+    return is_same;
+}
+
+/* ---- split -------------------------------------------------------------------------------------- */
+
+static void whole_profile(const struct render_split *split, double r_mm, double rgb[IO_CHANNEL_COUNT])
+{
+    const struct render_band_source *const source = &split->source;
+    /* The last node may round to beyond the axis, where the table is 0. */
+    const double r_max_mm = source->table->rows[source->row].axis.r_max_mm;
+    lut_splat_sample(source->table, source->row, fmin(r_mm, r_max_mm), rgb);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (split->blurred[c] && r_mm <= split->blurred[c]->reach_mm)
+            rgb[c] = render_footprint_sample(split->blurred[c], r_mm);
+    }
+}
+
+/*
+ * Taylor's polynomial of a channel in 1 - s/s_cap, s the distance squared: of the polynomial through
+ * CAP_NODES Chebyshev nodes about the cap. The profile is completely monotonic in s, so all terms are
+ * positive, and caps rise inwards, below the profile.
+ */
+static void fit_cap(const dipole_stack *stack, double cap_mm, double terms[RENDER_CAP_TERMS])
+{
+    enum { CAP_NODES = 7 };
+    const double half_width = 0.25; /* in s/s_cap */
+    double r_mm[CAP_NODES], x[CAP_NODES], divided[CAP_NODES];
+    for (int i = 0; i < CAP_NODES; i++) {
+        x[i] = half_width * cos(PI * (i + 0.5) / CAP_NODES);
+        r_mm[i] = cap_mm * sqrt(1 - x[i]);
+    }
+    dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, r_mm, CAP_NODES, divided);
+    for (int order = 1; order < CAP_NODES; order++) { /* Newton's form */
+        for (int i = CAP_NODES - 1; i >= order; i--)
+            divided[i] = (divided[i] - divided[i - 1]) / (x[i] - x[i - order]);
+    }
+    double power[CAP_NODES] = { divided[CAP_NODES - 1] }; /* and from it powers of x */
+    for (int i = CAP_NODES - 2; i >= 0; i--) {
+        for (int k = CAP_NODES - 1; k > 0; k--)
+            power[k] = power[k - 1] - x[i] * power[k];
+        power[0] = divided[i] - x[i] * power[0];
+    }
+    for (int k = 0; k < RENDER_CAP_TERMS; k++)
+        terms[k] = fmax(power[k], 0);
+}
+
+/* All caps, scaled to meet the table. */
+static void fit_caps(struct render_split *split)
+{
+    for (int b = 1; b < split->band_count; b++) {
+        double at_cap[IO_CHANNEL_COUNT];
+        whole_profile(split, split->bands[b].cap_mm, at_cap);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            double *const terms = split->caps[b][c];
+            if (!(at_cap[c] > 0))
+                continue;
+            fit_cap(split->source.medium->stacks[c], split->bands[b].cap_mm, terms);
+            const double scale = terms[0] > 0 ? at_cap[c] / terms[0] : 0;
+            for (int k = 0; k < RENDER_CAP_TERMS; k++)
+                terms[k] *= scale;
+        }
+    }
+}
+
+bool render_split_init(const struct render_band_source *source, const struct render_band *bands,
+                       int band_count, struct render_split *split, dipole_status *status)
+{
+    *split = (struct render_split){ .source = *source, .band_count = band_count };
+    for (int b = 0; b < band_count; b++)
+        split->bands[b] = bands[b];
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (source->blur_mm[c] > 0 &&
+            !render_footprint_create(source->medium->stacks[c], source->blur_mm[c], &split->blurred[c],
+                                     status))
+            return false;
+    }
+    fit_caps(split);
+    return true;
+}
+
+void render_split_end(struct render_split *split)
+{
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        free(split->blurred[c]);
+}
+
+/* What a cap puts in place of the profile. */
+static double cap_per_mm2(const struct render_split *split, int band, int channel, double r_mm)
+{
+    const double ratio = r_mm / split->bands[band].cap_mm, x = 1 - ratio * ratio;
+    const double *const t = split->caps[band][channel];
+    return t[0] + x * (t[1] + x * (t[2] + x * t[3]));
+}
+
+/* Of the band and all beyond it, where rgb is the whole profile. */
+static void from_band(const struct render_split *split, int band, double r_mm,
+                      const double whole[IO_CHANNEL_COUNT], double rgb[IO_CHANNEL_COUNT])
+{
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        rgb[c] = whole[c];
+        if (band == split->band_count || r_mm > split->bands[split->band_count - 1].r_outer_mm)
+            rgb[c] = 0;
+        else if (r_mm < split->bands[band].cap_mm)
+            rgb[c] = cap_per_mm2(split, band, c, r_mm);
+    }
+}
+
+void render_split_from_per_mm2(const struct render_split *split, int band, double r_mm,
+                               double rgb_out[IO_CHANNEL_COUNT])
+{
+    double whole[IO_CHANNEL_COUNT];
+    whole_profile(split, r_mm, whole);
+    from_band(split, band, r_mm, whole, rgb_out);
+}
+
+static void band_alone(const struct render_split *split, int band, double r_mm,
+                       const double whole[IO_CHANNEL_COUNT], double rgb_out[IO_CHANNEL_COUNT])
+{
+    double beyond[IO_CHANNEL_COUNT];
+    from_band(split, band, r_mm, whole, rgb_out);
+    from_band(split, band + 1, r_mm, whole, beyond);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        rgb_out[c] -= beyond[c];
+}
+
+void render_split_band_per_mm2(const struct render_split *split, int band, double r_mm,
+                               double rgb_out[IO_CHANNEL_COUNT])
+{
+    double whole[IO_CHANNEL_COUNT];
+    whole_profile(split, r_mm, whole);
+    band_alone(split, band, r_mm, whole, rgb_out);
+}
+
+/* ---- tables ------------------------------------------------------------------------------------- */
 
 struct lut_axis render_bands_axis(const struct render_band_source *source)
 {
@@ -46,49 +180,24 @@ struct lut_axis render_bands_axis(const struct render_band_source *source)
     return axis;
 }
 
-/* Put the blurred profile in place of the sharp one, where a channel is to be blurred and they differ. */
-static bool blur(const struct render_band_source *source, const struct lut_axis *axis,
-                 double (*profile)[IO_CHANNEL_COUNT], dipole_status *status)
-{
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        struct render_footprint *footprint = NULL;
-        if (!(source->blur_mm[c] > 0))
-            continue;
-        if (!render_footprint_create(source->medium->stacks[c], source->blur_mm[c], &footprint, status))
-            return false;
-        for (int i = 0; i < axis->node_count; i++) {
-            const double r_mm = fmin(lut_axis_r_mm(axis, i), axis->r_max_mm);
-            if (r_mm <= footprint->reach_mm)
-                profile[i][c] = render_footprint_sample(footprint, r_mm);
-        }
-        free(footprint);
-    }
-    return true;
-}
-
 bool render_bands_bake(const struct render_band_source *source, const struct render_band *bands,
                        int band_count, float *rgb, dipole_status *status)
 {
     const struct lut_axis axis = render_bands_axis(source);
-    double(*const profile)[IO_CHANNEL_COUNT] = malloc((size_t)axis.node_count * sizeof *profile);
-    if (!profile)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a profile of %d nodes",
-                           axis.node_count);
-    /* The last node may round to beyond the axis, where the table is 0. */
-    for (int i = 0; i < axis.node_count; i++)
-        lut_splat_sample(source->table, source->row, fmin(lut_axis_r_mm(&axis, i), axis.r_max_mm),
-                         profile[i]);
-    const bool done = blur(source, &axis, profile, status);
+    struct render_split split;
+    const bool done = render_split_init(source, bands, band_count, &split, status);
     for (int i = 0; done && i < axis.node_count; i++) {
         const double r_mm = fmin(lut_axis_r_mm(&axis, i), axis.r_max_mm);
+        double whole[IO_CHANNEL_COUNT], part[IO_CHANNEL_COUNT];
+        whole_profile(&split, r_mm, whole);
         for (int b = 0; b < band_count; b++) {
-            const double weight = render_band_weight(&bands[b], r_mm);
+            band_alone(&split, b, r_mm, whole, part);
             float *const node = rgb + 4 * ((size_t)b * (size_t)axis.node_count + (size_t)i);
             for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-                node[c] = (float)(weight * profile[i][c]);
+                node[c] = (float)part[c];
             node[3] = 0;
         }
     }
-    free(profile);
+    render_split_end(&split);
     return done;
 }

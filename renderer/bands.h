@@ -1,33 +1,28 @@
 /*
- * The profile as a sum of bands, each on a ring of distances twice as wide as the last and sampled twice as
- * coarsely: what is far from a sample need not know exactly where it is. theory.md T21.
+ * The profile as a sum of bands of scale: each reaches twice as far as the last, is as much smoother, and
+ * is summed over light samples twice as far apart: what is far from a sample need not know exactly where it
+ * is. theory.md T21.
  */
 #ifndef RENDERER_BANDS_H
 #define RENDERER_BANDS_H
 
+#include "renderer/footprint.h"
 #include "renderer/media.h"
 
 /* Nodes of a table: steps of less than 0.2 % of the distance, which interpolation errs by some 1e-5 of the
  * profile for. */
-enum { RENDER_BAND_LIMIT = 8, RENDER_BAND_NODES = 8193 };
+enum { RENDER_BAND_LIMIT = 12, RENDER_BAND_NODES = 8193, RENDER_CAP_TERMS = 4 };
 
 struct render_band {
-    double spacing_mm;             /* of the light samples that it is summed over      */
-    double r_inner_mm, r_outer_mm; /* its weight is 0 outside                          */
-    double rise_mm, fall_mm;       /* weight rises over rise..2 rise, falls over fall..2 fall;
-                                      0: it is 1 from the start, to the end            */
+    double spacing_mm; /* of the light samples that it is summed over                              */
+    double cap_mm;     /* within, the profile is replaced by a smooth cap; 0: it is not, the finest */
+    double r_outer_mm; /* the band is 0 beyond: the next one's cap, of the last r_max               */
 };
 
-/*
- * Bands for samples spacing_mm apart at the finest, out to r_max_mm. A band begins ring_spacings of the
- * finer band's spacings away: 6 err by less than 6e-5 of the total each, 2.3 more by ten times less.
- * Returns how many.
- */
-int render_bands_make(double spacing_mm, double r_max_mm, double ring_spacings,
+/* Bands for samples spacing_mm apart at the finest, out to r_max_mm; each one's cap is cap_spacings of its
+ * spacings wide. Returns how many. */
+int render_bands_make(double spacing_mm, double r_max_mm, double cap_spacings,
                       struct render_band bands[RENDER_BAND_LIMIT]);
-
-/* Part of the profile that the band carries at r_mm, 0 to 1; the bands' weights add to 1. */
-double render_band_weight(const struct render_band *band, double r_mm);
 
 /* Where a medium's profile comes from: a row of a table, and where a channel's blur_mm > 0 its average
  * by footprint.h. */
@@ -38,8 +33,33 @@ struct render_band_source {
     double blur_mm[IO_CHANNEL_COUNT];
 };
 
-/* The axis of the bands' own tables: in the logarithm (power 0), with nodes as dense as the weights need.
- */
+/* Whether two profiles are the same in the same bands. */
+bool render_bands_are_same(const struct render_band_source *a, const struct render_band *a_bands,
+                           int a_count, const struct render_band_source *b,
+                           const struct render_band *b_bands, int b_count);
+
+/* A profile in bands. */
+struct render_split {
+    struct render_band_source source;
+    int band_count;
+    struct render_band bands[RENDER_BAND_LIMIT];
+    double caps[RENDER_BAND_LIMIT][IO_CHANNEL_COUNT][RENDER_CAP_TERMS]; /* in powers of 1 - (r/cap)^2 */
+    struct render_footprint *blurred[IO_CHANNEL_COUNT];                 /* NULL: the table's           */
+};
+
+/* Table and medium must outlive the split, which the caller ends with render_split_end, even on failure. */
+DIPOLE_CHECKED bool render_split_init(const struct render_band_source *source,
+                                      const struct render_band *bands, int band_count,
+                                      struct render_split *split, dipole_status *status);
+void render_split_end(struct render_split *split);
+
+/* One band at r_mm, in 1/mm^2, and the sum of it and all beyond it: of the first the whole profile. */
+void render_split_band_per_mm2(const struct render_split *split, int band, double r_mm,
+                               double rgb_out[IO_CHANNEL_COUNT]);
+void render_split_from_per_mm2(const struct render_split *split, int band, double r_mm,
+                               double rgb_out[IO_CHANNEL_COUNT]);
+
+/* The axis of the bands' own tables: in the logarithm (power 0), with nodes as dense as the caps need. */
 struct lut_axis render_bands_axis(const struct render_band_source *source);
 
 /* Each band's table on that axis: R G B 0 per node, band after band, node_count x 4 floats each.

@@ -8,29 +8,39 @@
 
 #include "renderer/plan.h"
 
+#include <math.h>
+
 /* A program that is compiled or found in a cache, and first run; what makes the levels of maps, the same.
  */
 #define RENDER_COST_PROGRAM_MS 5.0
 #define RENDER_COST_LEVELS_MS 60.0
 
 /* Nanoseconds each. */
-#define RENDER_COST_TRIANGLE 90.0        /* drawn once, whatever it covers               */
-#define RENDER_COST_TRIANGLE_4 170.0     /* the same, where pixels have four points      */
-#define RENDER_COST_EMPTY_PIXEL 12.0     /* cleared and looked at                        */
-#define RENDER_COST_SURFACE_PIXEL 80.0   /* covered: four points found, one resolved     */
-#define RENDER_COST_VIEW_TEXEL 17.0      /* of a light's view, cleared and drawn         */
-#define RENDER_COST_READ_TEXEL 25.0      /* of the view, read back and put into samples  */
-#define RENDER_COST_SHADOW_PIXEL 100.0   /* covered, lit and shaded at one point         */
-#define RENDER_COST_GLOSS_PIXEL 260.0    /* the same, some at four                       */
-#define RENDER_COST_COMPOSITE_PIXEL 45.0 /* covered                                      */
-#define RENDER_COST_SPLAT_EVALUATION 2.8 /* one sample at one pixel                      */
-#define RENDER_COST_MAP_TEXEL 37.0       /* of a translucent shadow map: drawn, levels made  */
-#define RENDER_COST_MAP_SAMPLE 66.0      /* one sample of a map at one point             */
-#define RENDER_COST_MAP_LAYER 25.0       /* each layer that it looks into                */
-#define RENDER_COST_MAP_CELL 40.0        /* one cell of the local response at one pixel  */
-#define RENDER_COST_MAP_EVALUATION 20.0  /* one texel of a map at one pixel              */
-#define RENDER_COST_SCREEN_PIXEL 6.0     /* touched by a simple pass                     */
-#define RENDER_COST_POINTS_PIXEL 180.0   /* whose four points are looked at */
+#define RENDER_COST_TRIANGLE 90.0         /* drawn once, whatever it covers               */
+#define RENDER_COST_TRIANGLE_4 170.0      /* the same, where pixels have four points      */
+#define RENDER_COST_EMPTY_PIXEL 12.0      /* cleared and looked at                        */
+#define RENDER_COST_SURFACE_PIXEL 80.0    /* covered: four points found, one resolved     */
+#define RENDER_COST_VIEW_TEXEL 17.0       /* of a light's view, cleared and drawn         */
+#define RENDER_COST_READ_TEXEL 25.0       /* of the view, read back and put into samples  */
+#define RENDER_COST_SHADOW_PIXEL 100.0    /* covered, lit and shaded at one point         */
+#define RENDER_COST_GLOSS_PIXEL 260.0     /* the same, some at four                       */
+#define RENDER_COST_COMPOSITE_PIXEL 45.0  /* covered                                      */
+#define RENDER_COST_SPLAT_EVALUATION 2.8  /* one sample at one pixel                      */
+#define RENDER_COST_GATHER_EVALUATION 1.4 /* one merged sample at one place, its list included  */
+#define RENDER_COST_GATHER_PIXEL 60.0     /* interpolated                                 */
+#define RENDER_COST_GATHER_SAMPLE 70.0    /* ordered and merged                           */
+#define RENDER_COST_MAP_TEXEL 37.0        /* of a translucent shadow map: drawn, levels made  */
+#define RENDER_COST_MAP_SAMPLE 66.0       /* one sample of a map at one point             */
+#define RENDER_COST_MAP_LAYER 25.0        /* each layer that it looks into                */
+#define RENDER_COST_MAP_CELL 40.0         /* one cell of the local response at one pixel  */
+#define RENDER_COST_MAP_EVALUATION 20.0   /* one texel of a map at one pixel              */
+#define RENDER_COST_SKY_SAMPLE 400.0      /* of the environment: its patches cut and put together */
+#define RENDER_COST_HARMONIC 4.0          /* each harmonic of each patch's irradiance */
+#define RENDER_COST_HARMONIC_PIXEL 5.0    /* the same by a shader, both of an order m */
+#define RENDER_COST_RAY 400.0             /* through the scene's triangles            */
+#define RENDER_COST_TREE_TRIANGLE 500.0   /* of the tree that they are traced through */
+#define RENDER_COST_SCREEN_PIXEL 6.0      /* touched by a simple pass                     */
+#define RENDER_COST_POINTS_PIXEL 180.0    /* whose four points are looked at */
 
 static inline double render_cost_ms(double ns_each, double count)
 {
@@ -81,7 +91,9 @@ static inline double render_cost_map_pixels(const struct render_plan *plan)
  */
 static inline double render_cost_splat_evaluations(const struct render_plan *plan)
 {
-    const double pi = 3.14159265358979323846, excess = 2.5;
+    const double pi = 3.14159265358979323846, excess = 2.5, sky_excess = 5;
+    const double excess_by_lights = excess * (double)plan->lit_count;
+    const double around = plan->has_environment ? sky_excess : 0;
     double count = 0;
     for (size_t i = 0; i < plan->media->object_count; i++) {
         const struct render_plan_object *const object = &plan->objects[i];
@@ -91,10 +103,68 @@ static inline double render_cost_splat_evaluations(const struct render_plan *pla
             const struct render_band *const band = &medium->bands[b];
             const double reached_mm2 = pi * band->r_outer_mm * band->r_outer_mm;
             const double area_mm2 = reached_mm2 < lit_mm2 ? reached_mm2 : lit_mm2;
-            count += object->pixel_count * area_mm2 / (band->spacing_mm * band->spacing_mm);
+            const double around_mm2 = reached_mm2 < 2 * lit_mm2 ? reached_mm2 : 2 * lit_mm2;
+            count += object->pixel_count * (excess_by_lights * area_mm2 + around * around_mm2) /
+                     (band->spacing_mm * band->spacing_mm);
         }
     }
+    return count;
+}
+
+/* Samples of the environment's light: of all the surface, four to a square as wide as the spacing. */
+static inline double render_cost_sky_samples(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const double spacing_mm = plan->objects[i].spacing_mm;
+        if (spacing_mm > 0)
+            count += 5 * plan->media->area_mm2[i] / (spacing_mm * spacing_mm);
+    }
+    return count;
+}
+
+static inline double render_cost_rays_ms(const struct render_plan *plan, int ray_count)
+{
+    return render_cost_ms(RENDER_COST_RAY * ray_count, render_cost_sky_samples(plan));
+}
+
+static inline double render_cost_sky_samples_ms(const struct render_plan *plan)
+{
+    const double harmonics = (plan->environment_order + 1.0) * (plan->environment_order + 1.0);
+    return render_cost_ms(RENDER_COST_SKY_SAMPLE + RENDER_COST_HARMONIC * harmonics,
+                          render_cost_sky_samples(plan) + (double)plan->triangle_count);
+}
+
+/* Light samples of all lights, about. */
+static inline double render_cost_samples(const struct render_plan *plan)
+{
+    const double excess = 2;
+    double count = 0;
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const double spacing_mm = plan->objects[i].spacing_mm;
+        if (spacing_mm > 0)
+            count += 0.5 * plan->media->area_mm2[i] / (spacing_mm * spacing_mm);
+    }
     return excess * (double)plan->lit_count * count;
+}
+
+/* The same of gathering: the finest band at each pixel, others at a third as many places in all. */
+static inline double render_cost_gather_evaluations(const struct render_plan *plan)
+{
+    const double pi = 3.14159265358979323846, excess = 2.5;
+    double count = 0;
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const struct render_plan_object *const object = &plan->objects[i];
+        const struct render_plan_medium *const medium = &plan->of_medium[object->medium];
+        const double lit_mm2 = 0.5 * plan->media->area_mm2[i];
+        for (int b = 0; b < medium->band_count && b < 2; b++) {
+            const struct render_band *const band = &medium->bands[b];
+            const double area_mm2 = fmin(pi * band->r_outer_mm * band->r_outer_mm, lit_mm2);
+            count +=
+                (b == 0 ? 1 : 0.6) * object->pixel_count * area_mm2 / (band->spacing_mm * band->spacing_mm);
+        }
+    }
+    return excess * count;
 }
 
 #endif

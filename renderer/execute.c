@@ -1,5 +1,7 @@
 #include "renderer/execute.h"
 
+#include "renderer/environment_draw.h"
+#include "renderer/gather_draw.h"
 #include "renderer/geometry.h"
 #include "renderer/solid.h"
 #include "renderer/splat_draw.h"
@@ -14,7 +16,7 @@
 enum {
     SAMPLES_PER_PIXEL = 4,
     PROGRAM_LIMIT = 64,
-    TEXTURE_LIMIT = 48,
+    TEXTURE_LIMIT = 56,
     DEFINES_SIZE = 256,
 };
 
@@ -55,7 +57,9 @@ struct render_executor {
     size_t texture_count;
     size_t draw_counts[RENDER_EFFECT_LIMIT];
     struct render_splatter *splatter;           /* NULL until light is first sampled */
+    struct render_gatherer *gatherer;           /* NULL until light is first gathered */
     struct render_tsm *tsm;                     /* NULL until a shadow map is first gathered */
+    struct render_sky *sky;                     /* NULL until an environment is first drawn */
     struct render_buffer_texture object_buffer; /* of render_executor_fill_media     */
     struct render_buffer_texture roughness_buffer;
     float point_places[SAMPLES_PER_PIXEL][2]; /* of a pixel's points: 0 to 1 across it */
@@ -159,7 +163,9 @@ void render_executor_destroy(struct render_executor *executor)
     for (size_t i = 0; i < executor->texture_count; i++)
         texture_end(&executor->textures[i]);
     render_splatter_destroy(executor->splatter);
+    render_gatherer_destroy(executor->gatherer);
     render_tsm_destroy(executor->tsm);
+    render_sky_destroy(executor->sky);
     render_buffer_texture_destroy(&executor->object_buffer);
     render_buffer_texture_destroy(&executor->roughness_buffer);
     glDeleteVertexArrays(1, &executor->empty_vertex_array);
@@ -171,11 +177,15 @@ void render_executor_renew_materials(struct render_executor *executor, const str
 {
     for (size_t i = 0; i < executor->mesh_count; i++)
         executor->meshes[i].roughness = roughness_of(&scene->objects[i]);
-    /* Both know their tables by address, where others may come to lie. */
+    /* All know their tables by address, where others may come to lie. */
     render_splatter_destroy(executor->splatter);
+    render_gatherer_destroy(executor->gatherer);
     render_tsm_destroy(executor->tsm);
+    render_sky_destroy(executor->sky);
     executor->splatter = NULL;
+    executor->gatherer = NULL;
     executor->tsm = NULL;
+    executor->sky = NULL;
 }
 
 /* ---- programs ----------------------------------------------------------------------------------- */
@@ -265,6 +275,8 @@ static void texture_size(const struct render_plan *plan, const struct render_tex
         *width_px = *height_px = largest;
     } else if (kind->size == RENDER_SIZE_MAP) {
         *width_px = *height_px = render_plan_map_side_px(plan);
+    } else if (kind->size == RENDER_SIZE_PEEL) {
+        *width_px = *height_px = plan->peel_side_px;
     } else if (kind->size == RENDER_SIZE_VERTICES) {
         *width_px = RENDER_VERTEX_ROW;
         *height_px = (int)((plan->vertex_count + RENDER_VERTEX_ROW - 1) / RENDER_VERTEX_ROW);
@@ -371,6 +383,16 @@ bool render_executor_need_splatter(const struct render_frame *frame, struct rend
     return true;
 }
 
+bool render_executor_need_gatherer(const struct render_frame *frame, struct render_gatherer **gatherer_out,
+                                   dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    if (!executor->gatherer && !render_gatherer_create(frame->plan->media, &executor->gatherer, status))
+        return false;
+    *gatherer_out = executor->gatherer;
+    return true;
+}
+
 bool render_executor_need_tsm(const struct render_frame *frame, struct render_tsm **tsm_out,
                               dipole_status *status)
 {
@@ -379,6 +401,21 @@ bool render_executor_need_tsm(const struct render_frame *frame, struct render_ts
         return false;
     *tsm_out = executor->tsm;
     return true;
+}
+
+bool render_executor_need_sky(const struct render_frame *frame, struct render_sky **sky_out,
+                              dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    if (!executor->sky && !render_sky_create(&executor->sky, status))
+        return false;
+    *sky_out = executor->sky;
+    return true;
+}
+
+struct render_sky *render_executor_sky(const struct render_executor *executor)
+{
+    return executor->sky;
 }
 
 struct render_tsm *render_executor_tsm(const struct render_executor *executor)

@@ -7,6 +7,8 @@
 
 struct render_executor;
 struct render_splatter;
+struct render_gatherer;
+struct render_sky;
 struct render_tsm;
 
 /* What a pass sees when its bind or run function is called. */
@@ -88,11 +90,18 @@ DIPOLE_CHECKED bool render_executor_need_splatter(const struct render_frame *fra
                                                   struct render_splatter **splatter_out,
                                                   dipole_status *status);
 
+DIPOLE_CHECKED bool render_executor_need_gatherer(const struct render_frame *frame,
+                                                  struct render_gatherer **gatherer_out,
+                                                  dipole_status *status);
 DIPOLE_CHECKED bool render_executor_need_tsm(const struct render_frame *frame, struct render_tsm **tsm_out,
+                                             dipole_status *status);
+
+DIPOLE_CHECKED bool render_executor_need_sky(const struct render_frame *frame, struct render_sky **sky_out,
                                              dipole_status *status);
 
 /* What was made; NULL before. */
 struct render_tsm *render_executor_tsm(const struct render_executor *executor);
+struct render_sky *render_executor_sky(const struct render_executor *executor);
 
 /* The triangles of all objects, for common/points.glsl; handed on as mesh_triangles and so on. */
 DIPOLE_CHECKED bool render_executor_use_meshes(const struct render_frame *frame, dipole_status *status);

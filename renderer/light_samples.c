@@ -104,8 +104,8 @@ static double block_extent_mm(const struct reducer *reducer, struct block block,
     return length == 1 ? 0.5 * largest : largest;
 }
 
-static bool append(struct render_light_samples *samples, const struct render_light_sample *sample,
-                   dipole_status *status)
+bool render_light_samples_add(struct render_light_samples *samples,
+                              const struct render_light_sample *sample, dipole_status *status)
 {
     if (samples->count == samples->capacity) {
         const size_t capacity = samples->capacity ? 2 * samples->capacity : FIRST_CAPACITY;
@@ -148,7 +148,7 @@ static bool append_block(const struct reducer *reducer, struct block block, doub
         sample.position_mm[k] = (float)(moment[k] / share);
         sample.flux_w[k] = (float)((view->irradiance ? irradiance / lit_count : share) * view->rgb[k]);
     }
-    return append(reducer->targets[reducer->object].samples, &sample, reducer->status);
+    return render_light_samples_add(reducer->targets[reducer->object].samples, &sample, reducer->status);
 }
 
 /* Halve the block across its longer side on the surface until both are short enough. */
@@ -387,14 +387,21 @@ static uint64_t spread_bits(uint64_t x)
     return (x | x << 2) & 0x1249249249249249;
 }
 
-static uint64_t cube_code(const struct render_light_sample *sample, const double min_mm[3], double cell_mm)
+uint64_t render_cube_code(const double position_mm[3], const double min_mm[3], double cell_mm)
 {
     uint64_t code = 0;
     for (int k = 0; k < 3; k++) {
-        const double cell = floor(((double)sample->position_mm[k] - min_mm[k]) / cell_mm);
-        code |= spread_bits((uint64_t)fmin(cell, 0x1fffff)) << k;
+        const double cell = floor((position_mm[k] - min_mm[k]) / cell_mm);
+        code |= spread_bits((uint64_t)fmin(fmax(cell, 0), 0x1fffff)) << k;
     }
     return code;
+}
+
+static uint64_t cube_code(const struct render_light_sample *sample, const double min_mm[3], double cell_mm)
+{
+    const double position_mm[3] = { (double)sample->position_mm[0], (double)sample->position_mm[1],
+                                    (double)sample->position_mm[2] };
+    return render_cube_code(position_mm, min_mm, cell_mm);
 }
 
 /* By object, then code; equal ones stay in their order. Digits in which all keys are alike are left out. */
@@ -500,7 +507,7 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
         while (end < count && keys[end].code == keys[first].code && keys[end].object == keys[first].object)
             end++;
         const struct render_light_sample sample = merge_run(samples, keys + first, end - first);
-        done = append(merged, &sample, status);
+        done = render_light_samples_add(merged, &sample, status);
     }
     free(unsorted);
     return done;

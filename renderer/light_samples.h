@@ -7,6 +7,8 @@
 
 #include "libdipole/dipole.h"
 
+#include <stdint.h>
+
 /* Light that enters through one patch of surface. Two texels of a buffer. */
 struct render_light_sample {
     float position_mm[3]; /* flux-weighted mean of the patch          */
@@ -57,6 +59,14 @@ DIPOLE_CHECKED bool render_light_samples_append(const struct render_light_target
  */
 DIPOLE_CHECKED bool render_light_samples_merge(const struct render_light_samples *samples, double cell_mm,
                                                struct render_light_samples *merged, dipole_status *status);
+
+/* Append one sample. Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_light_samples_add(struct render_light_samples *samples,
+                                             const struct render_light_sample *sample,
+                                             dipole_status *status);
+
+/* The cube of side cell_mm that a position is in, as its place on a space-filling curve; 2^21 to a side. */
+uint64_t render_cube_code(const double position_mm[3], const double min_mm[3], double cell_mm);
 
 void render_light_samples_destroy(struct render_light_samples *samples);
 

@@ -20,6 +20,8 @@ struct options {
     double epsilon;
     int technique, context, area;
     int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
+    int environment_samples;
+    double ambient_visibility; /* rays */
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
@@ -91,9 +93,12 @@ static void print_plan(const struct render_report *report)
     printf("technique %s, epsilon %g\n", render_technique_names[report->technique], report->epsilon);
     if (report->r_max_mm > 0) {
         printf("error predicted %.3g = truncation %.3g + aliasing %.3g + blur %.3g + banding %.3g + table "
-               "%.3g\n",
+               "%.3g",
                report->error_predicted, report->truncation_error, report->aliasing_error,
                report->blur_error, report->banding_error, report->table_error);
+        if (report->environment_error > 0)
+            printf(" + environment %.3g", report->environment_error);
+        printf("\n");
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);
     }
@@ -292,6 +297,9 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                        .drawing = { .technique = (enum render_technique)options->technique,
                                     .area = (enum render_area)options->area,
                                     .epsilon = options->epsilon,
+                                    .environment_samples =
+                                        (enum render_environment_samples)options->environment_samples,
+                                    .ambient_visibility = (int)options->ambient_visibility,
                                     .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
                                              .response = (enum render_tsm_response)options->tsm_response,
                                              .part = (enum render_tsm_part)options->tsm_part,
@@ -312,6 +320,7 @@ static bool check_usage(const struct options *options, dipole_status *status)
 {
     const enum render_technique technique = (enum render_technique)options->technique;
     const bool is_splat = technique == RENDER_TECHNIQUE_AUTO || technique == RENDER_TECHNIQUE_SPLAT;
+    const bool has_samples = is_splat || technique == RENDER_TECHNIQUE_GATHER;
     const bool is_reference = technique == RENDER_TECHNIQUE_REFERENCE;
     const bool has_tsm_options = options->tsm_gather || options->tsm_response || options->tsm_part ||
                                  options->tsm_samples || options->layer_pairs;
@@ -328,6 +337,12 @@ static bool check_usage(const struct options *options, dipole_status *status)
         { is_reference && options->context >= 0, "--technique reference cannot be used with --context" },
         { options->area != RENDER_AREA_FLUX && !is_splat && !options->is_viewed,
           "--splat-area is of --technique splat alone" },
+        { options->environment_samples && !has_samples && !options->is_viewed,
+          "--environment-samples is of --technique gather and splat alone" },
+        { options->ambient_visibility != floor(options->ambient_visibility),
+          "--ambient-visibility is not a whole number of rays" },
+        { options->ambient_visibility > 0 && !has_samples && !is_reference && !options->is_viewed,
+          "--ambient-visibility is of --technique gather, splat and reference alone" },
         { has_tsm_options && technique != RENDER_TECHNIQUE_TSM && !options->is_viewed,
           "--tsm, --tsm-response, --tsm-part, --tsm-samples and --peel are of --technique tsm alone" },
     };
@@ -360,11 +375,15 @@ int main(int argc, char **argv)
           .kind = CLI_CHOICE,
           .target = &options.technique,
           .argument = "NAME",
-          .help = "splat: subsurface scattering; lambert: light leaves where it enters; auto: splat, or "
-                  "lambert where scattering stays within a pixel; tsm: translucent shadow maps, fast and "
-                  "rough; reference: the integral over the surface "
-                  "on the "
-                  "CPU, slow, its error a tenth of epsilon, no OpenGL, no tables. Default auto.",
+          .help =
+              "gather: subsurface scattering, light samples summed by scale; splat: the same, each sample "
+              "drawn over the pixels within its reach; lambert: light leaves where it enters; auto: "
+              "gather, splat for "
+              "epsilon below 0.003, or lambert where scattering stays within a pixel; tsm: translucent "
+              "shadow "
+              "maps, fast and rough; reference: the integral over the surface on the CPU, slow, its error "
+              "a tenth of "
+              "epsilon, no OpenGL, no tables. Default auto.",
           .choices = render_technique_names },
         { .name = "splat-area",
           .kind = CLI_CHOICE,
@@ -412,6 +431,22 @@ int main(int argc, char **argv)
               "Tell material from air by N surfaces behind each other in translucent shadow maps, an even "
               "number up to 16; default 0: all is taken for solid.",
           .choices = layer_count_names },
+        { .name = "environment-samples",
+          .kind = CLI_CHOICE,
+          .target = &options.environment_samples,
+          .argument = "WHERE",
+          .help =
+              "Where light of the scene's environment is sampled: surface, on the triangles, the default; "
+              "peel, on layers peeled along y as in the paper; peel3, along x, y and z. For comparison.",
+          .choices = render_environment_samples_names },
+        { .name = "ambient-visibility",
+          .kind = CLI_NUMBER,
+          .target = &options.ambient_visibility,
+          .argument = "N",
+          .help = "Rays from each light sample that tell what hides the environment from it, up to 4096; "
+                  "default 0: nothing does.",
+          .min = 0,
+          .max = 4096 },
         { .name = "epsilon",
           .letter = 'e',
           .kind = CLI_NUMBER,

@@ -11,7 +11,8 @@
 
 enum { LIGHT_LIMIT = 1024 };
 
-const char *const render_technique_names[] = { "auto", "splat", "lambert", "reference", "tsm", NULL };
+const char *const render_technique_names[] = { "auto", "splat",  "lambert", "reference",
+                                               "tsm",  "gather", NULL };
 const char *const render_area_names[] = { "flux", "overlap", NULL };
 
 static struct render_decision decision(bool is_active, const char *format, va_list arguments)
@@ -103,6 +104,11 @@ bool render_plan_check_table(const struct render_table *table, const struct io_m
                        "scene's %.9g (material_hash %s, the scene's %s)",
                        material->name, name, io_channel_names[channel], in_table, in_scene, there.text,
                        here.text);
+}
+
+bool render_plan_sums_samples(const struct render_plan *plan)
+{
+    return plan->technique == RENDER_TECHNIQUE_SPLAT || plan->technique == RENDER_TECHNIQUE_GATHER;
 }
 
 bool render_light_shines(const struct io_light *light)
@@ -200,7 +206,8 @@ static bool read_scene(const struct render_request *request, struct render_plan 
                        dipole_status *status)
 {
     const struct io_scene *const scene = request->scene;
-    if (!render_plan_check_request(scene, request->epsilon, status) || !take_media(request, plan, status))
+    if (!render_plan_check_request(scene, request->epsilon, status) || !take_media(request, plan, status) ||
+        !render_plan_take_environment(request, plan, status))
         return false;
     plan->epsilon = request->epsilon;
     plan->width_px = scene->camera.width_px;
@@ -250,6 +257,17 @@ static void tell_objects_apart(const struct render_request *request, struct rend
         plan->ids_reason = "objects within r_max of each other";
 }
 
+/* Gathering costs a part of what splats do (docs/rendering.md), whatever the scene. */
+static enum render_technique fastest_technique(const struct render_request *request,
+                                               const struct render_plan *plan)
+{
+    if (plan->has_scattering && plan->r_max_px < 1)
+        return RENDER_TECHNIQUE_LAMBERT;
+    if (request->area != RENDER_AREA_FLUX || plan->epsilon < RENDER_GATHER_EPSILON_MIN)
+        return RENDER_TECHNIQUE_SPLAT;
+    return RENDER_TECHNIQUE_GATHER;
+}
+
 static void choose_technique(const struct render_request *request, struct render_plan *plan)
 {
     plan->technique = request->technique;
@@ -257,13 +275,9 @@ static void choose_technique(const struct render_request *request, struct render
     if (request->is_captured)
         plan->technique = RENDER_TECHNIQUE_SPLAT;
     else if (plan->technique == RENDER_TECHNIQUE_AUTO)
-        plan->technique =
-            plan->has_scattering && plan->r_max_px < 1 ? RENDER_TECHNIQUE_LAMBERT : RENDER_TECHNIQUE_SPLAT;
+        plan->technique = fastest_technique(request, plan);
     if (plan->technique != RENDER_TECHNIQUE_SPLAT)
         plan->area = RENDER_AREA_FLUX;
-    if (request->scene->has_environment)
-        render_plan_add_note(plan, "the environment \"%.120s\" is not drawn: no technique knows it yet",
-                             request->scene->environment.path);
 }
 
 /* ---- the plan ----------------------------------------------------------------------------------- */
@@ -293,8 +307,9 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_spend_epsilon(request, plan);
         tell_objects_apart(request, plan);
         choose_technique(request, plan);
-        done =
-            render_plan_make_views(request, plan, status) && render_plan_make_maps(request, plan, status);
+        done = render_plan_light_from_around(request, plan, status) &&
+               render_plan_make_views(request, plan, status) &&
+               render_plan_make_maps(request, plan, status);
     }
     if (done) {
         render_plan_settle_spacing(request, plan);
@@ -314,6 +329,7 @@ void render_plan_destroy(struct render_plan *plan)
 {
     if (!plan)
         return;
+    render_plan_forget_environment(plan);
     render_media_destroy(plan->own_media);
     free(plan->objects);
     free(plan->of_medium);

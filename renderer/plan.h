@@ -6,6 +6,7 @@
 #define RENDERER_PLAN_H
 
 #include "renderer/bands.h"
+#include "renderer/environment.h"
 #include "renderer/projection.h"
 #include "renderer/render.h"
 
@@ -18,6 +19,9 @@ struct render_request {
     const struct render_table *tables;    /* one for each medium; NULL: baked to the plan's table_epsilon */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps            */
     struct render_tsm_options tsm;
+    const struct render_environment *environment; /* the scene's, if it has one; NULL: read for this plan */
+    enum render_environment_samples environment_samples;
+    int ambient_visibility;
     double epsilon;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
@@ -80,7 +84,13 @@ struct render_decision render_not_called_for(const char *format, ...) DIPOLE_PRI
 
 /* OTHER: kept by its pass, which says how to bind it. */
 enum render_format { RENDER_RGBA32F = 0, RENDER_R32F, RENDER_R32UI, RENDER_DEPTH32F, RENDER_OTHER };
-enum render_size { RENDER_SIZE_FRAME = 0, RENDER_SIZE_LIGHT_VIEW, RENDER_SIZE_MAP, RENDER_SIZE_VERTICES };
+enum render_size {
+    RENDER_SIZE_FRAME = 0,
+    RENDER_SIZE_LIGHT_VIEW,
+    RENDER_SIZE_MAP,
+    RENDER_SIZE_VERTICES,
+    RENDER_SIZE_PEEL
+};
 
 /* Width of textures with a texel for each vertex of the scene. */
 enum { RENDER_VERTEX_ROW = 1024 };
@@ -153,12 +163,20 @@ struct render_plan {
     bool has_object_ids;    /* objects are told apart: they differ, or are near each other */
     const char *ids_reason; /* why, or why not                                             */
     size_t lit_count;       /* lights that are not black                        */
+    bool has_environment;   /* that is drawn                                    */
+    const struct render_environment *environment; /* NULL: none, black, or the technique cannot       */
+    struct render_environment *own_environment;   /* when the request brought none                    */
+    struct render_irradiance **irradiance;        /* of each medium; NULL where it lights nothing     */
+    int environment_order;                        /* the highest of any medium                        */
+    int peel_side_px;                             /* of the largest layer; 0 unless peeled            */
     size_t triangle_count;
     double covered_px; /* pixels that objects may cover, at most all       */
 
     /* The error budget: shares of epsilon, then what they lead to, of the worst medium. */
     double truncation_epsilon, aliasing_epsilon, banding_epsilon, table_epsilon;
-    double truncation_error, aliasing_error, blur_error, banding_error, table_error, error_predicted;
+    double interpolation_epsilon; /* of gathering alone */
+    double truncation_error, aliasing_error, blur_error, banding_error, table_error, environment_error,
+        error_predicted;
     double r_max_mm;   /* the farthest medium's                            */
     double r_max_px;   /* on the picture, at the nearest                   */
     double spacing_mm; /* the narrowest medium's                           */
@@ -198,6 +216,9 @@ DIPOLE_CHECKED bool render_plan_check_request(const struct io_scene *scene, doub
 /* Whether a light is not black. */
 bool render_light_shines(const struct io_light *light);
 
+/* Whether light samples are summed: by splats or by gathering. */
+bool render_plan_sums_samples(const struct render_plan *plan);
+
 /* Fails unless the table is of this medium, by its hash; names the first coefficient that differs. place:
  * the table's file, or NULL. */
 DIPOLE_CHECKED bool render_plan_check_table(const struct render_table *table,
@@ -222,6 +243,17 @@ bool render_plan_wants(const struct render_plan *plan, const char *texture);
 
 /* Slices of a volume for so many samples, 0: the usual number; 0 when there is no such pattern. */
 int render_plan_slice_count(int sample_count);
+
+/* Texels a side of an object's peeled layers; 0 where it is not sampled. */
+int render_plan_peel_side_px(const struct render_plan *plan, size_t object);
+/* The axis of RENDER_ENVIRONMENT_PEEL: y. */
+enum { RENDER_PEEL_AXIS = 1 };
+
+/* Fails for a number of rays that is out of range. */
+DIPOLE_CHECKED bool render_plan_check_rays(int ray_count, dipole_status *status);
+
+/* Why nothing is lit; NULL when something may be. */
+const char *render_plan_dark_reason(const struct render_plan *plan);
 
 /* The texels of the largest map; 0 when there is none. */
 int render_plan_map_side_px(const struct render_plan *plan);

@@ -1,5 +1,6 @@
 /* How epsilon is shared out, and how far and how finely each medium is summed for it. */
 #include "renderer/footprint.h"
+#include "renderer/gather.h"
 #include "renderer/plan_internal.h"
 
 #include <math.h>
@@ -15,15 +16,19 @@
 #define BANDING_SHARE 0.02
 #define TABLE_SHARE 0.02
 
+/* Gathering merges more, and interpolates. */
+#define GATHER_BANDING_SHARE 0.18
+#define GATHER_INTERPOLATION_SHARE 0.1
+
+/* Caps of so many spacings keep the bands of splats under their share of epsilon = 0.01; for a tenth of
+ * that, so many more are needed. */
+#define CAP_SPACINGS 8
+#define CAP_SPACINGS_PER_DECADE 2
+#define CAP_EPSILON 0.01
+
 /* A profile too narrow to be sampled within ALIASING_SHARE is blurred, and half of it each is spent on
  * aliasing and blur, if samples may then be so many times farther apart. */
 #define BLUR_GAIN 2
-
-/* Rings of so many spacings keep the bands' error under their share of epsilon = 0.01; for a tenth of that,
- * so many more are needed (bands.h). */
-#define RING_SPACINGS 6
-#define RING_SPACINGS_PER_DECADE 2.3
-#define RING_EPSILON 0.01
 
 /* A sampled shape is followed by at least so many samples, however far the light scatters. */
 #define SAMPLES_ACROSS 32
@@ -154,6 +159,12 @@ static double lit_area_mm2(const struct io_scene *scene, const struct io_mesh *m
     return sum_mm2;
 }
 
+/* Light from all around is another light, which all of the surface faces. */
+static double area_lit_from_around_mm2(const struct render_plan *plan, size_t object)
+{
+    return plan->environment ? plan->media->area_mm2[object] : 0;
+}
+
 /* How many light samples there would be, about, if they were least_mm apart at least. */
 static double expected_samples(const struct render_request *request, const struct render_plan *plan,
                                double least_mm)
@@ -176,11 +187,13 @@ static void limit_samples(const struct render_request *request, struct render_pl
     double least_mm = plan->spacing_mm;
     for (size_t i = 0; i < request->scene->object_count;
          i++) /* no more than this: as if all faced each light */
-        plan->objects[i].lit_area_mm2 = plan->media->area_mm2[i] * (double)plan->lit_count;
+        plan->objects[i].lit_area_mm2 =
+            plan->media->area_mm2[i] * (double)plan->lit_count + area_lit_from_around_mm2(plan, i);
     if (expected_samples(request, plan, least_mm) <= limit)
         return;
     for (size_t i = 0; i < request->scene->object_count; i++)
-        plan->objects[i].lit_area_mm2 = lit_area_mm2(request->scene, request->scene->objects[i].mesh);
+        plan->objects[i].lit_area_mm2 = lit_area_mm2(request->scene, request->scene->objects[i].mesh) +
+                                        area_lit_from_around_mm2(plan, i);
     while (expected_samples(request, plan, least_mm) > limit)
         least_mm *= 1.05;
     for (size_t i = 0; i < request->scene->object_count; i++) {
@@ -244,14 +257,17 @@ static void settle_medium(const struct render_request *request, struct render_pl
     const double wanted_mm = planned->wanted_mm;
     if (!(wanted_mm > 0))
         return;
-    const double decades = log10(RING_EPSILON / plan->epsilon);
-    const double ring_spacings = RING_SPACINGS + RING_SPACINGS_PER_DECADE * fmax(decades, 0);
+    const bool is_gathered = plan->technique == RENDER_TECHNIQUE_GATHER;
+    const double decades = fmax(log10(CAP_EPSILON / plan->epsilon), 0);
+    const double cap_spacings = is_gathered ? render_gather_cap_spacings(plan->banding_epsilon)
+                                            : CAP_SPACINGS + CAP_SPACINGS_PER_DECADE * decades;
+    const double finest_mm = (is_gathered ? RENDER_GATHER_FINEST : 1) * planned->spacing_mm;
     /* What is captured is summed by others, from the finest samples alone; so are samples that are counted.
      */
     const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
     const double reach_mm = planned->r_max_mm;
-    planned->band_count = render_bands_make(planned->spacing_mm, reach_mm,
-                                            is_single ? INFINITY : ring_spacings, planned->bands);
+    planned->band_count =
+        render_bands_make(finest_mm, reach_mm, is_single ? INFINITY : cap_spacings, planned->bands);
     plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
     if (request->is_captured)
         return;
@@ -272,18 +288,22 @@ static void settle_medium(const struct render_request *request, struct render_pl
 
 void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan)
 {
-    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+    if (!render_plan_sums_samples(plan))
         return;
     const double texel_mm = render_plan_widest_spacing_mm(plan);
+    if (plan->technique == RENDER_TECHNIQUE_GATHER) {
+        plan->banding_epsilon = GATHER_BANDING_SHARE * plan->epsilon;
+        plan->interpolation_epsilon = GATHER_INTERPOLATION_SHARE * plan->epsilon;
+    }
     for (size_t m = 0; m < plan->media->count; m++)
         settle_medium(request, plan, m, texel_mm);
 }
 
 void render_plan_predict_error(const struct render_request *request, struct render_plan *plan)
 {
-    if (plan->technique != RENDER_TECHNIQUE_SPLAT || request->is_captured || !plan->has_scattering)
+    if (!render_plan_sums_samples(plan) || request->is_captured || !plan->has_scattering)
         return;
-    plan->banding_error = plan->band_count > 1 ? plan->banding_epsilon : 0;
+    plan->banding_error = (plan->band_count > 1 ? plan->banding_epsilon : 0) + plan->interpolation_epsilon;
     for (size_t m = 0; m < plan->media->count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
         plan->truncation_error = fmax(plan->truncation_error, planned->truncation_error);
@@ -301,5 +321,5 @@ void render_plan_predict_error(const struct render_request *request, struct rend
                                  plan->epsilon);
     }
     plan->error_predicted = plan->truncation_error + plan->aliasing_error + plan->blur_error +
-                            plan->banding_error + plan->table_error;
+                            plan->banding_error + plan->table_error + plan->environment_error;
 }

@@ -10,6 +10,14 @@ enum { RENDER_VIEW_SIDE_LIMIT = 4096 };
 
 void render_plan_add_note(struct render_plan *plan, const char *format, ...) DIPOLE_PRINTF(2, 3);
 
+/* plan_environment.c: the environment that may be drawn; then, once the technique is known, its irradiance
+ * in each medium; its end. */
+DIPOLE_CHECKED bool render_plan_take_environment(const struct render_request *request,
+                                                 struct render_plan *plan, dipole_status *status);
+DIPOLE_CHECKED bool render_plan_light_from_around(const struct render_request *request,
+                                                  struct render_plan *plan, dipole_status *status);
+void render_plan_forget_environment(struct render_plan *plan);
+
 /* plan_budget.c: share out epsilon; r_max, spacing and blur of each visible medium. Then, once the views
  * are known, their finest spacing tells what aliasing is left, and the bands can be laid out. */
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan);

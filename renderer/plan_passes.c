@@ -40,6 +40,11 @@ static const struct render_texture textures[] = {
     { .name = "tsm_vertices", .format = RENDER_OTHER },                        /* as position_mm    */
     { .name = "tsm_vertex_radiosity", .size = RENDER_SIZE_VERTICES },
     { .name = "tsm_surface_radiosity", .is_multisampled = true }, /* w = object + 1                  */
+    { .name = "environment_harmonics", .format = RENDER_OTHER },  /* kept by environment_draw.c    */
+    { .name = "environment_tree", .format = RENDER_OTHER },
+    { .name = "peel_position_mm", .size = RENDER_SIZE_PEEL }, /* w = object + 1                       */
+    { .name = "peel_normal", .size = RENDER_SIZE_PEEL },      /* w = cosine of the facet to the axis  */
+    { .name = "peel_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_PEEL },
     { .name = "overlap_sum" }, /* irradiance times R_d, summed; a = how many samples                 */
     { .name = "radiosity" },   /* W/mm^2                                                              */
     { .name = "specular" },    /* radiance, already averaged over the pixel                           */

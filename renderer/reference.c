@@ -1,6 +1,7 @@
 #include "renderer/reference.h"
 
 #include "lutgen/parallel.h"
+#include "renderer/environment_visibility.h"
 #include "renderer/plan.h"
 #include "renderer/reference_sum.h"
 
@@ -32,9 +33,17 @@ enum {
 /* Radiance this far below the picture's root mean square may err by the tree's error of this. */
 #define LEAST_SHARE 1e-3
 
-enum row { ROW_SURFACE, ROW_VISIBILITY, ROW_INTEGRAL, ROW_SPECULAR, ROW_TONE_MAP, ROW_COUNT };
-static const char *const row_names[ROW_COUNT] = { "surface", "visibility", "surface_integral", "specular",
-                                                  "tone_map" };
+enum row {
+    ROW_SURFACE,
+    ROW_VISIBILITY,
+    ROW_ENVIRONMENT,
+    ROW_INTEGRAL,
+    ROW_SPECULAR,
+    ROW_TONE_MAP,
+    ROW_COUNT
+};
+static const char *const row_names[ROW_COUNT] = { "surface",          "visibility", "environment",
+                                                  "surface_integral", "specular",   "tone_map" };
 
 struct reference {
     const struct io_scene *scene;
@@ -43,6 +52,7 @@ struct reference {
     struct render_pixel_medium *pixel_media; /* of each object */
     double path_mm;                          /* shortest mean free path of all that scatters */
     size_t lit_count;                        /* lights that shine */
+    struct render_environment *environment;  /* NULL: none, or black */
     struct render_tracer *tracer;
     struct render_surface *surface;
     struct render_pixel_view view;
@@ -259,13 +269,31 @@ static bool is_converged(const struct reference *reference)
            report->error_predicted <= reference->wanted_error && report->spacing_mm <= reference->path_mm;
 }
 
-static void note_environment(struct reference *reference)
+static bool is_glossy(const struct io_scene *scene)
+{
+    bool is_glossy = false;
+    for (size_t i = 0; i < scene->object_count; i++)
+        is_glossy |= scene->objects[i].has_specular;
+    return is_glossy;
+}
+
+static void explain_environment(struct reference *reference)
 {
     struct render_report *const report = &reference->report;
-    if (reference->scene->has_environment)
+    const int ray_count = reference->options->ambient_visibility;
+    if (!reference->environment) {
+        explain(reference, ROW_ENVIRONMENT, false,
+                reference->scene->has_environment ? "the environment is black" : "the scene has none");
+        return;
+    }
+    if (ray_count > 0)
+        explain(reference, ROW_ENVIRONMENT, true, "summed without harmonics; %d rays from each sample",
+                ray_count);
+    else
+        explain(reference, ROW_ENVIRONMENT, true, "summed without harmonics; nothing stands in its way");
+    if (is_glossy(reference->scene))
         snprintf(report->notes[report->note_count++], sizeof report->notes[0],
-                 "the environment \"%.120s\" is not drawn: no technique knows it yet",
-                 reference->scene->environment.path);
+                 "gloss does not mirror the environment");
 }
 
 static void note_shortfall(struct reference *reference)
@@ -326,8 +354,10 @@ static bool integrate(struct reference *reference, dipole_status *status)
                            reference->view.width_px, reference->view.height_px);
     reference->step_px = (int)fmax(sqrt((double)count / PROBED_PIXELS), 1);
     if (!render_surface_create(reference->scene, &reference->surface, status) ||
-        !render_sum_create(&reference->view, reference->surface, reference->media,
-                           reference->options->thread_count, &reference->sum, status) ||
+        !render_sum_create(
+            &reference->view, reference->surface, reference->media,
+            &(struct render_sum_sky){ reference->environment, reference->options->ambient_visibility },
+            reference->options->thread_count, &reference->sum, status) ||
         !converge(reference, status))
         return false;
     const double *sum = reference->last;
@@ -354,19 +384,11 @@ static bool integrate(struct reference *reference, dipole_status *status)
 /* Why there is nothing to sum; NULL when there is. */
 static const char *why_no_integral(const struct reference *reference)
 {
-    if (reference->lit_count == 0)
+    if (reference->lit_count == 0 && !reference->environment)
         return "no light shines";
     if (!reference->media->has_scattering)
         return "no channel scatters";
     return is_anything_seen(reference) ? NULL : "no object is in the picture";
-}
-
-static bool is_glossy(const struct io_scene *scene)
-{
-    bool is_glossy = false;
-    for (size_t i = 0; i < scene->object_count; i++)
-        is_glossy |= scene->objects[i].has_specular;
-    return is_glossy;
 }
 
 static void mirror(struct reference *reference)
@@ -402,7 +424,7 @@ static void tone_map(struct reference *reference)
 
 static bool draw(struct reference *reference, dipole_status *status)
 {
-    note_environment(reference);
+    explain_environment(reference);
     if (!see(reference, status))
         return false;
     const char *const why_not = why_no_integral(reference);
@@ -465,8 +487,15 @@ static bool begin(struct reference *reference, dipole_status *status)
 {
     const struct io_scene *const scene = reference->scene;
     if (!render_plan_check_request(scene, reference->report.epsilon, status) ||
-        !read_media(reference, status) || !render_tracer_create(scene, &reference->tracer, status))
+        !read_media(reference, status) || !render_tracer_create(scene, &reference->tracer, status) ||
+        !render_plan_check_rays(reference->options->ambient_visibility, status) ||
+        (scene->has_environment &&
+         !render_environment_read(&scene->environment, &reference->environment, status)))
         return false;
+    if (reference->environment && !render_environment_shines(reference->environment)) {
+        render_environment_destroy(reference->environment);
+        reference->environment = NULL;
+    }
     for (size_t i = 0; i < scene->light_count; i++)
         reference->lit_count += render_light_shines(&scene->lights[i]);
     const struct render_ball ball = render_ball_of_scene(scene);
@@ -487,6 +516,7 @@ static void destroy(struct reference *reference)
     render_surface_destroy(reference->surface);
     render_tracer_destroy(reference->tracer);
     render_media_destroy(reference->media);
+    render_environment_destroy(reference->environment);
     free(reference->pixel_media);
     free(reference->halves[0]);
     free(reference->halves[1]);

@@ -1,7 +1,9 @@
 #include "renderer/reference_sum.h"
 
 #include "lutgen/parallel.h"
+#include "renderer/environment_visibility.h"
 #include "renderer/plan.h"
+#include "renderer/reference_environment.h"
 #include "renderer/reference_tree.h"
 
 #include <math.h>
@@ -42,6 +44,9 @@ struct render_sum {
     struct render_profile **profiles; /* of each medium; NULL where it scatters nothing */
     double area_mm2;
     int thread_count;
+    struct render_sum_sky sky;
+    struct render_exact_irradiance **irradiance; /* of each medium; NULL without a sky */
+    struct render_visibility **visibility;       /* the same; NULL where nothing is in the way */
 
     /* of the chunk */
     size_t first, count;
@@ -74,9 +79,26 @@ static bool create_profiles(struct render_sum *sum, dipole_status *status)
     return true;
 }
 
+static bool look_around(struct render_sum *sum, dipole_status *status)
+{
+    const struct render_environment *const environment = sum->sky.environment;
+    bool done = true;
+    for (size_t i = 0; done && environment && i < sum->media->count; i++) {
+        const struct render_medium *const medium = &sum->media->media[i];
+        if (!medium->has_scattering)
+            continue;
+        done = render_exact_irradiance_create(environment, medium->eta, sum->thread_count,
+                                              &sum->irradiance[i], status);
+        if (done && sum->sky.ray_count > 0)
+            done = render_visibility_create(sum->view->tracer, environment, medium->eta, sum->sky.ray_count,
+                                            &sum->visibility[i], status);
+    }
+    return done;
+}
+
 bool render_sum_create(const struct render_pixel_view *view, const struct render_surface *surface,
-                       const struct render_media *media, int thread_count, struct render_sum **sum_out,
-                       dipole_status *status)
+                       const struct render_media *media, const struct render_sum_sky *sky, int thread_count,
+                       struct render_sum **sum_out, dipole_status *status)
 {
     *sum_out = NULL;
     const size_t object_count = view->scene->object_count;
@@ -88,16 +110,20 @@ bool render_sum_create(const struct render_pixel_view *view, const struct render
     sum->media = media;
     sum->area_mm2 = render_surface_area_mm2(surface);
     sum->thread_count = thread_count;
+    sum->sky = *sky;
+    sum->irradiance = calloc(media->count, sizeof(struct render_exact_irradiance *));
+    sum->visibility = calloc(media->count, sizeof(struct render_visibility *));
     sum->profiles = calloc(media->count, sizeof(struct render_profile *));
     sum->statuses = calloc(2 * object_count, sizeof *sum->statuses);
     for (int half = 0; half < 2; half++)
         sum->entries[half] = calloc(object_count, sizeof *sum->entries[half]);
-    if (!sum->profiles || !sum->statuses || !sum->entries[0] || !sum->entries[1]) {
+    if (!sum->profiles || !sum->irradiance || !sum->visibility || !sum->statuses || !sum->entries[0] ||
+        !sum->entries[1]) {
         render_sum_destroy(sum);
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the light in %zu objects",
                            object_count);
     }
-    if (!create_profiles(sum, status)) {
+    if (!create_profiles(sum, status) || !look_around(sum, status)) {
         render_sum_destroy(sum);
         return false;
     }
@@ -128,7 +154,13 @@ void render_sum_destroy(struct render_sum *sum)
     forget_chunk(sum);
     for (size_t i = 0; i < sum->media->count && sum->profiles; i++)
         render_profile_destroy(sum->profiles[i]);
+    for (size_t i = 0; i < sum->media->count && sum->irradiance && sum->visibility; i++) {
+        render_exact_irradiance_destroy(sum->irradiance[i]);
+        render_visibility_destroy(sum->visibility[i]);
+    }
     free(sum->profiles);
+    free(sum->irradiance);
+    free(sum->visibility);
     free(sum->statuses);
     free(sum->entries[0]);
     free(sum->entries[1]);
@@ -169,6 +201,20 @@ static void light_point(const struct render_sum *sum, const struct render_surfac
     }
 }
 
+/* Light from all around enters, too, by the smooth normal. number: of the point, the same in every run. */
+static void light_from_around(const struct render_sum *sum, const struct render_surface_point *point,
+                              uint64_t number, double area_mm2, double flux_w[IO_CHANNEL_COUNT])
+{
+    const size_t medium = sum->media->of_object[point->object];
+    double irradiance[3], share[3] = { 1, 1, 1 };
+    render_exact_irradiance_at(sum->irradiance[medium], point->normal, irradiance);
+    if (sum->visibility[medium])
+        render_visibility_share(sum->visibility[medium], point->position_mm, point->normal,
+                                point->facet_normal, number, share);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        flux_w[c] += area_mm2 * share[c] * irradiance[c];
+}
+
 static struct render_profile *profile_of(const struct render_sum *sum, size_t object)
 {
     return sum->profiles[sum->media->of_object[object]];
@@ -193,6 +239,8 @@ static void take_part(void *context, int part)
                 sample->position_mm[k] = point.position_mm[k];
             if (profile_of(sum, point.object))
                 light_point(sum, &point, area_mm2, sample->flux_w);
+            if (profile_of(sum, point.object) && sum->sky.environment)
+                light_from_around(sum, &point, 2 * number + (uint64_t)half, area_mm2, sample->flux_w);
         }
     }
 }

@@ -2,6 +2,7 @@
 #ifndef RENDERER_REFERENCE_SUM_H
 #define RENDERER_REFERENCE_SUM_H
 
+#include "renderer/environment.h"
 #include "renderer/media.h"
 #include "renderer/reference_pixel.h"
 
@@ -9,6 +10,12 @@
 enum { RENDER_SUM_CHUNK = 1 << 19 };
 
 struct render_sum;
+
+/* Light from all around; environment NULL: none. A ray_count of 0: nothing stands in its way. */
+struct render_sum_sky {
+    const struct render_environment *environment;
+    int ray_count;
+};
 
 /* A pass over the picture. */
 struct render_sum_pass {
@@ -19,11 +26,11 @@ struct render_sum_pass {
                                        this where that is more than of itself                       */
 };
 
-/* Fails with DIPOLE_OUT_OF_MEMORY. View, surface and media must outlive the sum. */
+/* Fails with DIPOLE_OUT_OF_MEMORY. View, surface, media and sky must outlive the sum. */
 DIPOLE_CHECKED bool render_sum_create(const struct render_pixel_view *view,
                                       const struct render_surface *surface,
-                                      const struct render_media *media, int thread_count,
-                                      struct render_sum **sum_out, dipole_status *status);
+                                      const struct render_media *media, const struct render_sum_sky *sky,
+                                      int thread_count, struct render_sum **sum_out, dipole_status *status);
 void render_sum_destroy(struct render_sum *sum);
 
 /*

@@ -28,6 +28,8 @@ bool render_create(const struct io_scene *scene, enum render_context_kind kind,
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a renderer");
     renderer->scene = scene;
     const bool done = render_media_create(scene, &renderer->media, status) &&
+                      (!scene->has_environment ||
+                       render_environment_read(&scene->environment, &renderer->environment, status)) &&
                       render_context_create(kind, &renderer->context, status) &&
                       renderer->context->make_current(renderer->context, status) &&
                       render_gl_start(renderer->context->load, &renderer->errors, status) &&
@@ -49,6 +51,7 @@ void render_destroy(struct renderer *renderer)
     render_tables_destroy(renderer->tables);
     render_volumes_destroy(renderer->volumes);
     render_media_destroy(renderer->media);
+    render_environment_destroy(renderer->environment);
     free(renderer);
 }
 
@@ -119,6 +122,7 @@ bool render_run(struct renderer *renderer, const struct render_request *request_
 {
     const struct render_table *tables;
     struct render_request request = *request_in;
+    request.environment = renderer->environment;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
     const bool done =
@@ -147,6 +151,7 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
         .blur_error = plan->blur_error,
         .banding_error = plan->banding_error,
         .table_error = plan->table_error,
+        .environment_error = plan->environment_error,
         .band_count = plan->band_count,
         .r_max_mm = is_splatted ? plan->r_max_mm : 0,
         .spacing_mm = is_splatted ? plan->spacing_mm : 0,
@@ -206,6 +211,8 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .tables = options->tables,
         .volumes = options->volumes,
         .tsm = options->tsm,
+        .environment_samples = options->environment_samples,
+        .ambient_visibility = options->ambient_visibility,
         .is_tone_mapped = options->is_tone_mapped,
     };
     double time_ms[RENDER_EFFECT_LIMIT];

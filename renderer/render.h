@@ -16,16 +16,18 @@ enum render_context_kind {
     RENDER_CONTEXT_WINDOW, /* GLFW, hidden; needs a display */
 };
 
-/* The default takes splats, or Lambert where scattering stays within a pixel. The reference (reference.h)
- * is slow and exact, and needs no OpenGL. */
+/* The default gathers, or takes splats where epsilon is small (RENDER_GATHER_EPSILON_MIN), or Lambert where
+ * scattering stays within a pixel. The reference (reference.h) is slow and exact, and needs no OpenGL. */
 enum render_technique {
     RENDER_TECHNIQUE_AUTO = 0,
     RENDER_TECHNIQUE_SPLAT,
     RENDER_TECHNIQUE_LAMBERT,
     RENDER_TECHNIQUE_REFERENCE,
-    RENDER_TECHNIQUE_TSM, /* translucent shadow maps; never taken by default */
+    RENDER_TECHNIQUE_TSM,    /* translucent shadow maps; never taken by default */
+    RENDER_TECHNIQUE_GATHER, /* what splats sum, by scale: fewer samples and pixels where the profile is
+                                wide */
 };
-/* "auto", "splat", "lambert", "reference", "tsm", NULL */
+/* "auto", "splat", "lambert", "reference", "tsm", "gather", NULL */
 extern const char *const render_technique_names[];
 
 /* How a splat knows the area that its sample stands for: by the flux of its texels, which needs no area; or
@@ -33,10 +35,22 @@ extern const char *const render_technique_names[];
 enum render_area { RENDER_AREA_FLUX = 0, RENDER_AREA_OVERLAP };
 extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 
+/* Where light from all around is sampled: on the triangles; or as in the paper, on layers peeled along y;
+ * or along all three axes. */
+enum render_environment_samples {
+    RENDER_ENVIRONMENT_SURFACE = 0,
+    RENDER_ENVIRONMENT_PEEL,
+    RENDER_ENVIRONMENT_PEEL3,
+};
+extern const char *const render_environment_samples_names[]; /* "surface", "peel", "peel3", NULL */
+
 /* epsilon: asked relative error of the radiosity. */
 #define RENDER_EPSILON_DEFAULT 0.01
 #define RENDER_EPSILON_MIN 1e-5
 #define RENDER_EPSILON_MAX 0.5
+
+/* Gathering sums in single precision by piecewise cubics, which keep no less. */
+#define RENDER_GATHER_EPSILON_MIN 0.003
 
 /* Tone mapping leaves pixels alone whose largest channel is up to this, times 2^exposure_ev. T20 */
 #define RENDER_TONE_KNEE 0.6
@@ -54,9 +68,9 @@ struct renderer;
 
 /*
  * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
- * and lights may change between calls, what its objects are made of only as render_renew_materials says.
- * Fails with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed) or
- * DIPOLE_OUT_OF_MEMORY.
+ * and lights may change between calls, what its objects are made of only as render_renew_materials says,
+ * its environment may not. Fails as render_environment_read does, with DIPOLE_NOT_SUPPORTED (no context:
+ * says which were tried and why each failed) or DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                                   struct renderer **renderer_out, dipole_status *status);
@@ -115,7 +129,9 @@ struct render_options {
     const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
     struct render_tsm_options tsm;
-    bool is_tone_mapped; /* 0..1 over the scene's background, for a PNG; else
+    enum render_environment_samples environment_samples;
+    int ambient_visibility; /* rays from each sample of the environment's light; 0: nothing hides it */
+    bool is_tone_mapped;    /* 0..1 over the scene's background, for a PNG; else
                             linear radiance, premultiplied by coverage (alpha)  */
 
     /* Of the reference alone. */
@@ -145,8 +161,9 @@ struct render_effect_report {
 struct render_report {
     enum render_technique technique; /* never AUTO */
     double epsilon;
-    double error_predicted; /* the sum of these five; of the reference estimated; INFINITY: not bounded */
+    double error_predicted; /* the sum of these six; of the reference estimated; INFINITY: not bounded */
     double truncation_error, aliasing_error, blur_error, banding_error, table_error;
+    double environment_error;    /* of the harmonics left out */
     double r_max_mm, spacing_mm; /* 0 when not splatted */
     size_t sample_count;         /* at the finest */
     size_t splat_count, view_count;

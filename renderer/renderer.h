@@ -13,6 +13,7 @@ struct renderer {
     struct render_gl_errors errors;
     struct render_executor *executor;
     struct render_media *media;
+    struct render_environment *environment; /* NULL: the scene has none */
     struct render_tables *tables;   /* baked when a plan first needed them, to the finest asked so far */
     struct render_volumes *volumes; /* the same                                                 */
 };

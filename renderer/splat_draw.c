@@ -15,9 +15,7 @@ struct medium_samples {
 
 /* What a table of bands was made for. */
 struct table_key {
-    const struct lut_splat *table;
-    size_t row;
-    double blur_mm[IO_CHANNEL_COUNT];
+    struct render_band_source source;
     int band_count;
     struct render_band bands[RENDER_BAND_LIMIT];
 };
@@ -168,22 +166,14 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
 
 /* ---- splats ------------------------------------------------------------------------------------- */
 
-static bool is_same_band(const struct render_band *a, const struct render_band *b)
+static struct render_band_source source_of(const struct render_plan *plan,
+                                           const struct render_table *tables, size_t medium)
 {
-    return a->spacing_mm == b->spacing_mm && a->r_inner_mm == b->r_inner_mm &&
-           a->r_outer_mm == b->r_outer_mm && a->rise_mm == b->rise_mm && a->fall_mm == b->fall_mm;
-}
-
-static bool is_table_of(const struct table_key *key, const struct render_table *table,
-                        const struct render_plan_medium *planned)
-{
-    bool is_same =
-        key->table == table->lut && key->row == table->row && key->band_count == planned->band_count;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        is_same = is_same && key->blur_mm[c] == planned->blur_mm[c];
-    for (int b = 0; b < planned->band_count; b++)
-        is_same = is_same && is_same_band(&key->bands[b], &planned->bands[b]);
-    return is_same;
+    struct render_band_source source = { .table = tables[medium].lut,
+                                         .row = tables[medium].row,
+                                         .medium = &plan->media->media[medium] };
+    memcpy(source.blur_mm, plan->of_medium[medium].blur_mm, sizeof source.blur_mm);
+    return source;
 }
 
 /* Fill the buffer of profiles, all media one after the other, unless it holds them already. */
@@ -195,8 +185,10 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     size_t node_count = 0;
     for (size_t m = 0; m < splatter->medium_count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
-        is_known &= is_table_of(&splatter->keys[m], &tables[m], planned);
-        const struct render_band_source source = { .table = tables[m].lut, .row = tables[m].row };
+        const struct table_key *const key = &splatter->keys[m];
+        const struct render_band_source source = source_of(plan, tables, m);
+        is_known &= render_bands_are_same(&key->source, key->bands, key->band_count, &source,
+                                          planned->bands, planned->band_count);
         if (planned->band_count > 0)
             node_count += (size_t)planned->band_count * (size_t)render_bands_axis(&source).node_count;
     }
@@ -209,10 +201,7 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     bool done = true;
     for (size_t m = 0; done && m < splatter->medium_count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
-        struct render_band_source source = { .table = tables[m].lut,
-                                             .row = tables[m].row,
-                                             .medium = &plan->media->media[m] };
-        memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
+        const struct render_band_source source = source_of(plan, tables, m);
         if (planned->band_count == 0)
             continue;
         done = render_bands_bake(&source, planned->bands, planned->band_count, next, status);
@@ -224,10 +213,8 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     for (size_t m = 0; done && m < splatter->medium_count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
         struct table_key *const key = &splatter->keys[m];
-        *key = (struct table_key){ .table = tables[m].lut,
-                                   .row = tables[m].row,
-                                   .band_count = planned->band_count };
-        memcpy(key->blur_mm, planned->blur_mm, sizeof key->blur_mm);
+        *key =
+            (struct table_key){ .source = source_of(plan, tables, m), .band_count = planned->band_count };
         memcpy(key->bands, planned->bands, sizeof key->bands);
     }
     free(nodes);

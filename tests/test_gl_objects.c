@@ -16,11 +16,13 @@ static const struct kept {
     size_t texture_count, buffer_count, vertex_array_count;
     bool is_per_medium;
 } kept_by_effects[] = {
-    { .effect = "surface", .texture_count = 1, .buffer_count = 1 },    /* the objects' gloss           */
-    { .effect = "object_ids", .texture_count = 1, .buffer_count = 1 }, /* the media                     */
-    { .effect = "light_samples", .vertex_array_count = 1 },            /* of the splats                 */
-    { .effect = "splat", .texture_count = 2, .buffer_count = 3 },      /* samples, profiles; and splats */
-    { .effect = "overlap", .texture_count = 2, .buffer_count = 3 },    /* the same                      */
+    { .effect = "surface", .texture_count = 1, .buffer_count = 1 },     /* the objects' gloss           */
+    { .effect = "object_ids", .texture_count = 1, .buffer_count = 1 },  /* the media                     */
+    { .effect = "light_samples", .vertex_array_count = 1 },             /* of the splats                 */
+    { .effect = "splat", .texture_count = 2, .buffer_count = 3 },       /* samples, profiles; and splats */
+    { .effect = "overlap", .texture_count = 2, .buffer_count = 3 },     /* the same                      */
+    { .effect = "environment", .texture_count = 1, .buffer_count = 1 }, /* harmonics               */
+    { .effect = "environment_peel", .texture_count = 1 },               /* the layer before         */
     { .effect = "tsm_table", .texture_count = 4, .buffer_count = 2, .is_per_medium = true },
     { .effect = "tsm_exact", .texture_count = 2, .buffer_count = 2, .is_per_medium = true },
     { .effect = "tsm_peel", .texture_count = 1 },   /* layers                        */
@@ -187,8 +189,10 @@ static void check_request(const struct test_scene *test, struct render_request r
         size_t least;
         const size_t draw_count = render_executor_draw_count(renderer->executor, e);
         const size_t most = expected_draws(plan, e, object_count, &least);
-        /* a translucent shadow map draws its own object, in as many layers and parts as are asked for */
-        if (strncmp(render_effects[e]->name, "tsm_", 4) == 0)
+        /* a translucent shadow map draws its own object, in as many layers and parts as are asked for;
+         * peeling until nothing is left */
+        const char *const name = render_effects[e]->name;
+        if (strncmp(name, "tsm_", 4) == 0 || strcmp(name, "environment_peel") == 0)
             assert_int_equal(draw_count > 0, most > 0);
         else
             assert_true(draw_count >= least && draw_count <= most);
@@ -262,6 +266,20 @@ static void objects_and_draws_are_those_of_the_plan(void **state)
         init_scene(&test, SCENE_LIT);
         check_request(&test, (struct render_request){ .technique = RENDER_TECHNIQUE_TSM, .tsm = maps[i] },
                       seen);
+        scene_end(&test);
+    }
+    const struct render_request around[] = {
+        { .technique = RENDER_TECHNIQUE_SPLAT, .ambient_visibility = 2 },
+        { .technique = RENDER_TECHNIQUE_SPLAT, .environment_samples = RENDER_ENVIRONMENT_PEEL3 },
+        { .technique = RENDER_TECHNIQUE_LAMBERT }
+    };
+    for (size_t i = 0; i < sizeof around / sizeof *around; i++) {
+        struct test_scene test;
+        init_scene(&test, SCENE_TWO);
+        test.scene.has_environment = true;
+        test.scene.environment.rgb[0] = 1;
+        strcpy(test.scene.environment.path, SOURCE_FOLDER "/scenes/probes/studio.exr");
+        check_request(&test, around[i], seen);
         scene_end(&test);
     }
     for (size_t e = 0; render_effects[e]; e++) {

@@ -1,4 +1,4 @@
-/* renderer/plan.c, projection.c, bands.c, splats.c: everything that is decided before OpenGL is called. */
+/* renderer/plan.c, projection.c, splats.c: everything that is decided before OpenGL is called. */
 #include "check.h"
 #include "scenes.h"
 
@@ -48,8 +48,9 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     struct test_scene test;
     init_sphere(&test);
     const struct io_material other = skin1();
-    struct render_request requests[11];
-    for (int i = 0; i < 11; i++)
+    enum { REQUESTS = 15, FIRST_AROUND = 11 };
+    struct render_request requests[REQUESTS];
+    for (int i = 0; i < REQUESTS; i++)
         requests[i] = request_for(&test);
     requests[1].technique = RENDER_TECHNIQUE_LAMBERT;
     requests[2].is_captured = true;
@@ -61,7 +62,14 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     requests[8].tsm = (struct render_tsm_options){ .response = RENDER_TSM_EXACT, .layer_count = 4 };
     requests[9].tsm.response = RENDER_TSM_TEXELS;
     requests[10].tsm.gather = RENDER_TSM_VERTEX;
-    for (int i = 0; i < 11; i++) {
+    requests[12].environment_samples = RENDER_ENVIRONMENT_PEEL3;
+    requests[12].ambient_visibility = 4;
+    requests[13].technique = RENDER_TECHNIQUE_LAMBERT;
+    requests[14].technique = RENDER_TECHNIQUE_SPLAT;
+    test.scene.environment.rgb[0] = 1;
+    strcpy(test.scene.environment.path, SOURCE_FOLDER "/scenes/probes/studio.exr");
+    for (int i = 0; i < REQUESTS; i++) {
+        test.scene.has_environment = i >= FIRST_AROUND;
         test.objects[0].has_specular = i == 3;
         if (i == 5)
             assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 2, 5, &other));
@@ -195,7 +203,7 @@ static void passes_per_view_are_repeated_together(void **state)
     static const char *const names[] = { "surface_meshes",  "surface",    "position_depth",
                                          "surface_resolve", "light_view", "light_samples",
                                          "specular",        "light_view", "light_samples",
-                                         "specular",        "splat",      "composite" };
+                                         "specular",        "gather",     "composite" };
     assert_int_equal(plan->pass_count, sizeof names / sizeof *names);
     for (size_t i = 0; i < plan->pass_count; i++) {
         assert_string_equal(plan->passes[i].pass->name, names[i]);
@@ -262,7 +270,8 @@ static void the_error_budget_is_kept(void **state)
     scene_end(&test);
 }
 
-/* Oracle: the definition. Where scattering stays within a pixel, splats are not called for. */
+/* Oracle: the definition. Where scattering stays within a pixel, neither gathering nor splats are called
+ * for; nor is gathering for an error that single precision and cubics cannot keep. */
 static void auto_takes_lambert_when_scattering_is_under_a_pixel(void **state)
 {
     (void)state;
@@ -270,7 +279,12 @@ static void auto_takes_lambert_when_scattering_is_under_a_pixel(void **state)
     init_sphere(&test);
     struct render_request request = request_for(&test);
     struct render_plan *near_plan = plan_for(&request);
-    assert_int_equal(near_plan->technique, RENDER_TECHNIQUE_SPLAT);
+    assert_int_equal(near_plan->technique, RENDER_TECHNIQUE_GATHER);
+    request.epsilon = 0.001;
+    struct render_plan *fine_plan = plan_for(&request);
+    assert_int_equal(fine_plan->technique, RENDER_TECHNIQUE_SPLAT);
+    render_plan_destroy(fine_plan);
+    request.epsilon = RENDER_EPSILON_DEFAULT;
     test.scene.camera.eye_mm[2] = 40000;
     struct render_plan *far_plan = plan_for(&request);
     assert_true(far_plan->r_max_px < 1);
@@ -343,31 +357,6 @@ static void the_callers_table_counts(void **state)
     lut_splat_destroy(coarse);
     lut_splat_destroy(other);
     scene_end(&test);
-}
-
-/* Oracle: the weights are a partition of unity, and 0 outside the ring that a band claims. */
-static void bands_add_up(void **state)
-{
-    (void)state;
-    struct rng rng = { .seed = 9 };
-    for (int i = 0; i < 500; i++) {
-        struct render_band bands[RENDER_BAND_LIMIT];
-        const double spacing_mm = log_uniform(&rng, 0.01, 1), r_max_mm = log_uniform(&rng, 0.1, 300);
-        const int count = render_bands_make(spacing_mm, r_max_mm, 6, bands);
-        assert_true(count >= 1 && count <= RENDER_BAND_LIMIT);
-        assert_close(bands[0].spacing_mm, spacing_mm, 0, "case %d", i);
-        for (int j = 0; j < 50; j++) {
-            const double r_mm = uniform(&rng, 0, 1) < 0.1 ? 0 : log_uniform(&rng, 1e-4, 1) * r_max_mm;
-            double sum = 0;
-            for (int b = 0; b < count; b++) {
-                const double weight = render_band_weight(&bands[b], r_mm);
-                assert_true(weight >= 0 && weight <= 1);
-                assert_true(weight == 0 || (r_mm >= bands[b].r_inner_mm && r_mm <= bands[b].r_outer_mm));
-                sum += weight;
-            }
-            assert_close(sum, 1, 1e-14, "case %d at %g mm", i, r_mm);
-        }
-    }
 }
 
 /* ---- views -------------------------------------------------------------------------------------- */
@@ -582,7 +571,6 @@ int main(void)
         cmocka_unit_test(auto_takes_lambert_when_scattering_is_under_a_pixel),
         cmocka_unit_test(a_light_view_that_is_too_coarse_is_told),
         cmocka_unit_test(the_callers_table_counts),
-        cmocka_unit_test(bands_add_up),
         cmocka_unit_test(every_vertex_is_in_a_lights_view),
         cmocka_unit_test(the_rectangle_of_a_ball_holds_it_tightly),
         cmocka_unit_test(splats_hold_what_their_samples_reach),

@@ -630,11 +630,11 @@ static void the_program_needs_no_opengl(void **state)
                                  &epsilon, "effects", &effects, "total_ms", &total_ms, "image", &image),
                      0);
     assert_string_equal(technique, "reference");
-    assert_int_equal(json_array_size(effects), 5);
+    assert_int_equal(json_array_size(effects), 6);
     const char *name, *reason;
     int is_active;
     double time_ms, error;
-    assert_int_equal(json_unpack(json_array_get(effects, 2), "{s:s, s:b, s:s, s:n, s:F, s:F !}", "name",
+    assert_int_equal(json_unpack(json_array_get(effects, 3), "{s:s, s:b, s:s, s:n, s:F, s:F !}", "name",
                                  &name, "active", &is_active, "reason", &reason, "predicted_ms", "ms",
                                  &time_ms, "error", &error),
                      0);

@@ -180,7 +180,8 @@ static void wrong_usage_is_code_2(void **state)
     (void)state;
     fails_with(RENDER " sphere.json", 2, "render: no --output (-o) IMG was given; try --help\n");
     fails_with(RENDER " sphere.json -o bad.exr --technique magic", 2,
-               "render: --technique is \"magic\", expected one of auto, splat, lambert, reference, tsm\n");
+               "render: --technique is \"magic\", expected one of auto, splat, lambert, reference, tsm, "
+               "gather\n");
     fails_with(RENDER " sphere.json -o bad.exr --context glx", 2,
                "render: --context is \"glx\", expected one of osmesa, egl, window\n");
     fails_with(RENDER " turn.json -o bad.exr --frames 2:1", 2,
@@ -253,7 +254,7 @@ static void results_are_told_as_promised(void **state)
     assert_string_equal(err, "");
     json_t *const result = json_loads(out, 0, NULL);
     assert_non_null(result);
-    assert_string_equal(json_string_value(json_object_get(result, "technique")), "splat");
+    assert_string_equal(json_string_value(json_object_get(result, "technique")), "gather");
     assert_string_equal(json_string_value(json_object_get(result, "image")), "a.exr");
     assert_close(json_number_value(json_object_get(result, "epsilon")), 0.02, 0, "epsilon");
     assert_true(json_number_value(json_object_get(result, "total_ms")) > 0);
@@ -273,7 +274,7 @@ static void results_are_told_as_promised(void **state)
     assert_int_equal(image->width_px, 64);
     assert_int_equal(image->height_px, 48);
     assert_int_equal(image->channel_count, 4);
-    assert_string_equal(io_image_find(image, "dipole:technique")->text, "splat");
+    assert_string_equal(io_image_find(image, "dipole:technique")->text, "gather");
     assert_string_equal(io_image_find(image, "dipole:version")->text, DIPOLE_VERSION);
     assert_close(io_image_find(image, "dipole:epsilon")->numbers[0], 0.02, 0, "attribute");
     io_image_destroy(image);
@@ -431,7 +432,7 @@ static struct io_image *draw_with(const char *prefix, const char *context, const
 static void all_contexts_give_the_same_picture(void **state)
 {
     (void)state;
-    static const char *const techniques[] = { "splat", "lambert", "tsm" };
+    static const char *const techniques[] = { "splat", "lambert", "tsm", "gather" };
     static const char *const scenes[] = { "sphere.json", "many.json" };
     static const struct {
         const char *prefix, *name;

@@ -33,25 +33,25 @@ static const char script[] =
     "\"$RENDER\" panel.json --view --epsilon 0.1 -o folder/saved.png &\n"
     "viewer=$!\n"
     "trap 'kill $viewer 2>/dev/null || true' EXIT\n"
-    "until_true titled 'splat, 640x800'\n"
-    "window=$(titled 'splat, 640x800' | head -n 1)\n"
+    "until_true titled 'gather, 640x800'\n"
+    "window=$(titled 'gather, 640x800' | head -n 1)\n"
     "to 600 700\n"
-    "settle 'splat, 640x800' first.png\n"
-    "key Tab; settle 'splat, 990x800' closed.png\n"
-    "key Tab; settle 'splat, 640x800' opened.png\n"
+    "settle 'gather, 640x800' first.png\n"
+    "key Tab; settle 'gather, 990x800' closed.png\n"
+    "key Tab; settle 'gather, 640x800' opened.png\n"
     "click 225 129; click 170 192; to 600 700; settle 'lambert, 640x800' lambert.png\n"
-    "click 225 129; click 170 154; to 600 700; settle 'splat, 640x800' splat.png\n"
-    "drag 175 422 200 422; to 600 700; settle 'splat, 640x800' edited.png\n"
-    "key c; settle 'splat, 640x800' split.png\n"
-    "drag 670 400 500 400; to 600 700; settle 'splat, 640x800' moved.png\n"
-    "key c; settle 'splat, 640x800' difference.png\n"
-    "key c; settle 'splat, 640x800' alone.png\n"
-    "rmdir folder; key s; settle 'splat, 640x800' failed.png; mkdir folder\n"
+    "click 225 129; click 170 154; to 600 700; settle 'gather, 640x800' again.png\n"
+    "drag 175 422 200 422; to 600 700; settle 'gather, 640x800' edited.png\n"
+    "key c; settle 'gather, 640x800' split.png\n"
+    "drag 670 400 500 400; to 600 700; settle 'gather, 640x800' moved.png\n"
+    "key c; settle 'gather, 640x800' difference.png\n"
+    "key c; settle 'gather, 640x800' alone.png\n"
+    "rmdir folder; key s; settle 'gather, 640x800' failed.png; mkdir folder\n"
     "click 100 329; click 100 404\n" /* close Material, open Save */
     "click 140 479; until_true test -s panel_view.json\n"
     "click 50 479; until_true test -s folder/saved.png\n"
     "to 600 600\n"
-    "drag 600 600 680 600; sleep 1; settle 'splat, 640x800' turned.png\n"
+    "drag 600 600 680 600; sleep 1; settle 'gather, 640x800' turned.png\n"
     "key q || true\n" /* its key-up may find no window left */
     "wait $viewer\n"
     "trap - EXIT\n";
@@ -124,8 +124,8 @@ static void check_pictures(void)
     assert_true(difference((struct part){ "first.png", 0 }, (struct part){ "closed.png", 0 }, PANEL) >
                 CHANGED);
     assert_true(picture_difference("first.png", "lambert.png") > CHANGED);
-    assert_true(picture_difference("first.png", "splat.png") < SAME);
-    assert_true(picture_difference("splat.png", "edited.png") > CHANGED);
+    assert_true(picture_difference("first.png", "again.png") < SAME);
+    assert_true(picture_difference("again.png", "edited.png") > CHANGED);
     assert_true(picture_difference("edited.png", "alone.png") < SAME);
     assert_true(picture_difference("edited.png", "difference.png") > CHANGED);
     assert_true(picture_difference("alone.png", "turned.png") > CHANGED);

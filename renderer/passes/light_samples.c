@@ -12,7 +12,7 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no light shines");
     if (request->is_captured)
         return render_called_for("captured, %.3g mm apart", plan->spacing_mm);
-    if (plan->technique != RENDER_TECHNIQUE_SPLAT)
+    if (!render_plan_sums_samples(plan))
         return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
     if (!plan->has_scattering)
         return render_not_called_for("no channel scatters");

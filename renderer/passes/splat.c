@@ -16,8 +16,8 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("areas are counted: overlap");
     if (!plan->has_scattering)
         return render_not_called_for("no channel scatters");
-    if (plan->lit_count == 0)
-        return render_not_called_for("no light shines");
+    if (render_plan_dark_reason(plan))
+        return render_not_called_for("%s", render_plan_dark_reason(plan));
     return render_called_for("scattered light reaches %.3g mm, %.3g pixels", plan->r_max_mm,
                              plan->r_max_px);
 }

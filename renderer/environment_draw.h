@@ -1,0 +1,24 @@
+/* Light from all around in the frame: where it enters, as samples or at pixels. State kept between frames.
+ */
+#ifndef RENDERER_ENVIRONMENT_DRAW_H
+#define RENDERER_ENVIRONMENT_DRAW_H
+
+#include "renderer/execute.h"
+
+struct render_sky;
+
+/* Its context must be current, here and below. Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_sky_create(struct render_sky **sky_out, dipole_status *status);
+void render_sky_destroy(struct render_sky *sky);
+
+/* Run functions of passes: harmonics for shaders; the tree that rays are traced through; light samples by
+ * triangles, and by depth peeling. */
+DIPOLE_CHECKED bool render_sky_upload(const struct render_frame *frame, dipole_status *status);
+DIPOLE_CHECKED bool render_sky_plant(const struct render_frame *frame, dipole_status *status);
+DIPOLE_CHECKED bool render_sky_sample(const struct render_frame *frame, dipole_status *status);
+DIPOLE_CHECKED bool render_sky_peel(const struct render_frame *frame, dipole_status *status);
+
+/* Bind the harmonics; a shader includes common/harmonics.glsl. */
+void render_sky_bind(const struct render_frame *frame);
+
+#endif

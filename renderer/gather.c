@@ -1,0 +1,255 @@
+#include "renderer/gather_places.h"
+
+#include "lutgen/parallel.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+enum { LIST = 256 };
+
+/* ---- media -------------------------------------------------------------------------------------- */
+
+/* Largest slope of what a half plane of light gives, 2 int_0^oo f dr, f a band and all beyond it. */
+static void edge_slope(const struct render_split *split, int band, double rgb[IO_CHANNEL_COUNT])
+{
+    enum { STEPS = 96 };
+    const double r_max_mm = split->bands[split->band_count - 1].r_outer_mm;
+    const double least_mm = 1e-3 * fmin(split->bands[band].r_outer_mm, r_max_mm),
+                 step = log(r_max_mm / least_mm) / STEPS;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        rgb[c] = 0;
+    for (int i = -1; i < STEPS; i++) { /* the first from 0 */
+        const double r_mm = i < 0 ? least_mm : least_mm * exp((i + 0.5) * step);
+        double value[IO_CHANNEL_COUNT];
+        render_split_from_per_mm2(split, band, r_mm, value);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            rgb[c] += 2 * value[c] * (i < 0 ? least_mm : r_mm * step);
+    }
+}
+
+/* Channels of which less lies beyond a cap are too dark to be seen. */
+#define VISIBLE_SHARE 1e-4
+
+/* Largest |f'|/f and |f''|/f of a band and all beyond it, over distances and channels. */
+static void own_changes(const struct render_split *split, int band, struct render_gather_medium *medium)
+{
+    enum { STEPS = 96 };
+    const double r_max_mm = split->bands[split->band_count - 1].r_outer_mm, step = 0.02;
+    const double least_mm = 0.05 * fmin(split->bands[band].cap_mm, r_max_mm);
+    for (int i = 0; band > 0 && i < STEPS; i++) {
+        const double r_mm = least_mm * pow(r_max_mm / (1.1 * least_mm), (double)i / (STEPS - 1)),
+                     h_mm = step * r_mm;
+        double before[IO_CHANNEL_COUNT], here[IO_CHANNEL_COUNT], after[IO_CHANNEL_COUNT];
+        render_split_from_per_mm2(split, band, r_mm - h_mm, before);
+        render_split_from_per_mm2(split, band, r_mm, here);
+        render_split_from_per_mm2(split, band, r_mm + h_mm, after);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            const double beyond = 4 * r_mm * r_mm * here[c];
+            if (!(beyond > VISIBLE_SHARE * split->source.medium->diffuse_reflectance[c]))
+                continue;
+            const double slope = fabs(after[c] - before[c]) / (2 * h_mm * here[c]);
+            const double bend = fabs(after[c] - 2 * here[c] + before[c]) / (h_mm * h_mm * here[c]);
+            medium->own_slope_per_mm[band] = fmax(medium->own_slope_per_mm[band], slope);
+            medium->own_bend_per_mm2[band] = fmax(medium->own_bend_per_mm2[band], bend);
+        }
+    }
+}
+
+bool render_gather_medium_init(const struct render_band_source *source, const struct render_band *bands,
+                               int band_count, struct render_gather_medium *medium, dipole_status *status)
+{
+    struct render_split split;
+    *medium = (struct render_gather_medium){ .band_count = band_count };
+    const bool done = render_split_init(source, bands, band_count, &split, status);
+    for (int b = 0; done && b < band_count; b++) {
+        double slope[IO_CHANNEL_COUNT], peak[IO_CHANNEL_COUNT];
+        render_gather_kernel_init(&split, b, &medium->kernels[b]);
+        medium->reach_mm[b] = (float)bands[b].r_outer_mm;
+        edge_slope(&split, b, slope);
+        own_changes(&split, b, medium);
+        render_split_from_per_mm2(&split, b, 0, peak);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            const double total = source->medium->diffuse_reflectance[c];
+            if (!(total > 0))
+                continue;
+            medium->slope_per_mm[b] = fmax(medium->slope_per_mm[b], slope[c] / total);
+            medium->bend_per_mm2[b] = fmax(medium->bend_per_mm2[b], 2 * peak[c] / total);
+        }
+    }
+    render_split_end(&split);
+    return done;
+}
+
+/* Measured: 0.45, 0.20 and 0.1 % at 1.5, 2 and 2.5 spacings; docs/rendering.md. */
+double render_gather_cap_spacings(double error)
+{
+    return fmax(2 * pow(2e-3 / error, 1 / 2.8), 1.5);
+}
+
+/* ---- sums --------------------------------------------------------------------------------------- */
+
+struct gather {
+    const struct render_gather_request *request;
+    const struct render_gather_loops *loops;
+    struct render_gather_places_of_frame places;
+    float *values[RENDER_GATHER_LEVELS]; /* R G B 0 of each node */
+    size_t group_limit;                  /* of any sources       */
+    int level;                           /* that is being summed */
+    atomic_size_t place_count, refined_count, evaluation_count;
+    atomic_bool is_out_of_memory;
+};
+
+struct scratch {
+    uint32_t *groups;
+    const struct render_gather_source *list[LIST];
+};
+
+/* One band at up to eight places. */
+static void sum_places(struct gather *gather, const struct render_gather_tile *tile, int band,
+                       const int members[], int count, size_t group_count, struct scratch *scratch)
+{
+    const struct render_gather_object *const object = &gather->request->objects[tile->object];
+    const struct render_gather_kernel *const kernel = &object->medium->kernels[band];
+    const struct render_gather_level *const source = &object->sources->levels[band];
+    struct render_gather_places places = { .sums = { { 0 } } };
+    struct render_gather_box box;
+    for (int i = 0; i < RENDER_GATHER_LANES; i++) {
+        const float *const place =
+            render_gather_place(gather->request, tile->pixels[members[i < count ? i : 0]]);
+        render_gather_box_add(&box, place, i == 0);
+        for (int k = 0; k < 3; k++)
+            places.position_mm[k][i] = place[k];
+    }
+    size_t listed = 0, evaluated = 0;
+    for (size_t g = 0; g < group_count; g++) {
+        const struct render_gather_group *const group = &source->groups[scratch->groups[g]];
+        for (unsigned bits = gather->loops->near(group, &box, kernel->reach2_mm2); bits; bits &= bits - 1)
+            scratch->list[listed++] = &group->sources[__builtin_ctz(bits)];
+        if (listed > LIST - RENDER_GATHER_LANES || g + 1 == group_count) {
+            gather->loops->sum(kernel, scratch->list, listed, &places);
+            evaluated += listed;
+            listed = 0;
+        }
+    }
+    atomic_fetch_add_explicit(&gather->evaluation_count, evaluated * (size_t)count, memory_order_relaxed);
+    for (int i = 0; i < count; i++) {
+        float *const value = gather->values[gather->level] + 4 * (size_t)tile->nodes[members[i]];
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            value[c] += places.sums[c][i];
+    }
+}
+
+/* One band at all nodes of a tile, or at those that are refined. */
+static void sum_band(struct gather *gather, const struct render_gather_tile *tile, int band,
+                     struct scratch *scratch)
+{
+    const struct render_gather_object *const object = &gather->request->objects[tile->object];
+    struct render_gather_box box;
+    int members[RENDER_GATHER_TILE_NODES], count = 0;
+    for (int i = 0; i < tile->count; i++) {
+        if (band >= tile->end && !tile->is_refined[i])
+            continue;
+        render_gather_box_add(&box, render_gather_place(gather->request, tile->pixels[i]), count == 0);
+        members[count++] = i;
+    }
+    const size_t group_count =
+        render_gather_find(&object->sources->levels[band], &box, object->medium->reach_mm[band],
+                           scratch->groups, gather->group_limit);
+    for (int i = 0; i < count; i += RENDER_GATHER_LANES)
+        sum_places(gather, tile, band, members + i,
+                   count - i < RENDER_GATHER_LANES ? count - i : RENDER_GATHER_LANES, group_count, scratch);
+}
+
+/* What coarser levels have summed already; else 0. */
+static void take_coarser(const struct gather *gather, const struct render_gather_tile *tile)
+{
+    for (int i = 0; i < tile->count; i++) {
+        float *const value = gather->values[gather->level] + 4 * (size_t)tile->nodes[i];
+        for (int k = 0; k < 4; k++)
+            value[k] = 0;
+        for (int corner = 0; corner < 4 && tile->coarser >= 0 && !tile->is_refined[i]; corner++) {
+            const float *const known =
+                gather->values[tile->coarser] + 4 * (size_t)tile->blends[i].nodes[corner];
+            for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+                value[c] += tile->blends[i].weights[corner] * known[c];
+        }
+    }
+}
+
+static void sum_row(void *context, int tile_y)
+{
+    struct gather *const gather = context;
+    const int width = gather->places.levels[gather->level].width;
+    struct scratch scratch = { .groups = malloc((gather->group_limit + 1) * sizeof *scratch.groups) };
+    if (!scratch.groups) {
+        atomic_store(&gather->is_out_of_memory, true);
+        return;
+    }
+    for (int tile_x = 0; tile_x * RENDER_GATHER_TILE < width; tile_x++) {
+        struct render_gather_tile tile;
+        for (int least = 0;
+             render_gather_tile_init(&gather->places, gather->level, tile_x, tile_y, least, &tile);
+             least = tile.object + 1) {
+            take_coarser(gather, &tile);
+            for (int band = tile.first; band < (tile.refined_count > 0 ? tile.last : tile.end); band++)
+                sum_band(gather, &tile, band, &scratch);
+            atomic_fetch_add_explicit(&gather->place_count, (size_t)tile.count, memory_order_relaxed);
+            atomic_fetch_add_explicit(&gather->refined_count, (size_t)tile.refined_count,
+                                      memory_order_relaxed);
+        }
+    }
+    free(scratch.groups);
+}
+
+size_t render_gather_group_limit(const struct render_gather_request *request)
+{
+    size_t limit = 0;
+    for (size_t i = 0; i < request->object_count; i++) {
+        const struct render_gather_sources *const sources = request->objects[i].sources;
+        for (int b = 0; sources && b < sources->band_count; b++)
+            limit = sources->levels[b].group_count > limit ? sources->levels[b].group_count : limit;
+    }
+    return limit;
+}
+
+static bool create_values(struct gather *gather, dipole_status *status)
+{
+    for (int l = 1; l < gather->places.level_count; l++) {
+        const struct render_gather_nodes *const level = &gather->places.levels[l];
+        const size_t count = (size_t)level->width * (size_t)level->height;
+        gather->values[l] = calloc(count, 4 * sizeof *gather->values[l]);
+        if (!gather->values[l])
+            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to gather at %zu places",
+                               count);
+    }
+    return true;
+}
+
+bool render_gather_run(const struct render_gather_request *request, float *radiosity_w_per_mm2,
+                       struct render_gather_counts *counts_out, dipole_status *status)
+{
+    struct gather gather = { .request = request,
+                             .loops = render_gather_loops_best(),
+                             .group_limit = render_gather_group_limit(request) };
+    gather.values[0] = radiosity_w_per_mm2;
+    bool done =
+        render_gather_places_init(request, &gather.places, status) && create_values(&gather, status);
+    for (int l = gather.places.level_count - 1; done && l >= 0; l--) {
+        gather.level = l;
+        lut_parallel_for((gather.places.levels[l].height + RENDER_GATHER_TILE - 1) / RENDER_GATHER_TILE,
+                         request->thread_count, sum_row, &gather);
+        if (atomic_load(&gather.is_out_of_memory))
+            done = dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                               "no memory to gather %zu groups of light samples", gather.group_limit);
+    }
+    if (done && counts_out)
+        *counts_out =
+            (struct render_gather_counts){ .place_count = atomic_load(&gather.place_count),
+                                           .refined_count = atomic_load(&gather.refined_count),
+                                           .evaluation_count = atomic_load(&gather.evaluation_count) };
+    for (int l = 1; l < RENDER_GATHER_LEVELS; l++)
+        free(gather.values[l]);
+    render_gather_places_end(&gather.places);
+    return done;
+}

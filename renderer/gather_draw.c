@@ -1,0 +1,255 @@
+#include "renderer/gather_draw.h"
+
+#include "lutgen/parallel.h"
+#include "renderer/splat_draw.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Interpolation may err by so many epsilon of what is there, by a bound that is seldom met: in the dark,
+ * where epsilon of the lit is much, it is the one that counts. */
+#define OWN_SHARE 4
+
+/* What a medium's kernels were made for. */
+struct known {
+    struct render_band_source source;
+    int band_count;
+    struct render_band bands[RENDER_BAND_LIMIT];
+};
+
+struct render_gatherer {
+    size_t medium_count;
+    struct known *known; /* of each medium */
+    struct render_gather_medium *media;
+    struct render_gather_counts counts;
+};
+
+bool render_gatherer_create(const struct render_media *media, struct render_gatherer **gatherer_out,
+                            dipole_status *status)
+{
+    *gatherer_out = NULL;
+    struct render_gatherer *const gatherer = calloc(1, sizeof *gatherer);
+    if (gatherer) {
+        gatherer->medium_count = media->count;
+        gatherer->known = calloc(media->count, sizeof *gatherer->known);
+        gatherer->media =
+            aligned_alloc(_Alignof(struct render_gather_medium), media->count * sizeof *gatherer->media);
+    }
+    if (!gatherer || !gatherer->known || !gatherer->media) {
+        render_gatherer_destroy(gatherer);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to gather from %zu media",
+                           media->count);
+    }
+    *gatherer_out = gatherer;
+    return true;
+}
+
+void render_gatherer_destroy(struct render_gatherer *gatherer)
+{
+    if (!gatherer)
+        return;
+    free(gatherer->known);
+    free(gatherer->media);
+    free(gatherer);
+}
+
+const struct render_gather_counts *render_gatherer_counts(const struct render_gatherer *gatherer)
+{
+    return &gatherer->counts;
+}
+
+/* Kernels of the media that are seen, anew where the bands or the table have changed. */
+static bool prepare_media(struct render_gatherer *gatherer, const struct render_frame *frame,
+                          dipole_status *status)
+{
+    const struct render_plan *const plan = frame->plan;
+    for (size_t m = 0; m < gatherer->medium_count; m++) {
+        const struct render_plan_medium *const planned = &plan->of_medium[m];
+        struct known *const known = &gatherer->known[m];
+        struct render_band_source source = { .table = frame->tables[m].lut,
+                                             .row = frame->tables[m].row,
+                                             .medium = &plan->media->media[m] };
+        memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
+        if (planned->band_count == 0 ||
+            render_bands_are_same(&known->source, known->bands, known->band_count, &source, planned->bands,
+                                  planned->band_count))
+            continue;
+        known->band_count = 0; /* until it is done */
+        if (!render_gather_medium_init(&source, planned->bands, planned->band_count, &gatherer->media[m],
+                                       status))
+            return false;
+        known->source = source;
+        known->band_count = planned->band_count;
+        memcpy(known->bands, planned->bands, sizeof known->bands);
+    }
+    return true;
+}
+
+/* ---- sources ------------------------------------------------------------------------------------ */
+
+/* Objects as they are gathered for: one, where they are not told apart. */
+struct objects {
+    size_t count;
+    struct render_gather_object *objects;
+    struct render_gather_sources *sources;
+    dipole_status *statuses;                 /* of each */
+    const struct render_plan_medium **media; /* of each */
+    struct render_light_sample *samples;     /* object by object */
+    size_t *first;                           /* of each, and one past the last */
+};
+
+static void sort_object(void *context, int index)
+{
+    const struct objects *const all = context;
+    const size_t o = (size_t)index;
+    all->statuses[o].code = DIPOLE_OK;
+    if (!all->objects[o].medium)
+        return;
+    if (!render_gather_sources_init(all->samples + all->first[o], all->first[o + 1] - all->first[o],
+                                    all->media[o]->bands, all->media[o]->band_count, &all->sources[o],
+                                    &all->statuses[o]))
+        return;
+    all->objects[o].sources = &all->sources[o];
+}
+
+/* Pixels are as far apart as this on the object's near side. */
+static double pixel_mm(const struct render_plan *plan, const struct render_plan_object *object)
+{
+    if (plan->camera.is_orthographic)
+        return plan->pixel_mm;
+    double in_view_mm[3];
+    render_projection_to_view(&plan->camera, object->ball.centre_mm, in_view_mm);
+    return plan->pixel_mm * fmax(in_view_mm[2] - object->ball.radius_mm, plan->camera.near_mm);
+}
+
+static void describe_objects(const struct render_gatherer *gatherer, const struct render_plan *plan,
+                             struct objects *all)
+{
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const struct render_plan_object *const planned = &plan->objects[i];
+        const size_t o = plan->has_object_ids ? i : 0;
+        if (!(planned->spacing_mm > 0))
+            continue;
+        const double apart_mm = pixel_mm(plan, planned);
+        struct render_gather_object *const object = &all->objects[o];
+        object->pixel_mm = object->medium ? fmin(object->pixel_mm, apart_mm) : apart_mm;
+        object->medium = &gatherer->media[planned->medium];
+        all->media[o] = &plan->of_medium[planned->medium];
+    }
+}
+
+/* Samples of all media, object by object. */
+static bool share_out_samples(const struct render_gatherer *gatherer, struct render_splatter *splatter,
+                              struct objects *all, dipole_status *status)
+{
+    size_t count = 0;
+    for (size_t m = 0; m < gatherer->medium_count; m++)
+        count += render_splatter_samples(splatter, m)->count;
+    all->samples = calloc(count + 1, sizeof *all->samples);
+    size_t *const next = calloc(all->count + 1, sizeof *next);
+    if (!all->samples || !next) {
+        free(next);
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples", count);
+    }
+    for (int is_placing = 0; is_placing < 2; is_placing++) {
+        for (size_t m = 0; m < gatherer->medium_count; m++) {
+            const struct render_light_samples *const of_medium = render_splatter_samples(splatter, m);
+            for (size_t i = 0; i < of_medium->count; i++) {
+                const struct render_light_sample *const sample = &of_medium->samples[i];
+                const size_t o = all->count == 1 ? 0 : (size_t)sample->object;
+                if (is_placing)
+                    all->samples[next[o]++] = *sample;
+                else
+                    all->first[o + 1]++;
+            }
+        }
+        for (size_t o = 0; !is_placing && o < all->count; o++) {
+            all->first[o + 1] += all->first[o];
+            next[o] = all->first[o];
+        }
+    }
+    free(next);
+    return true;
+}
+
+static void objects_end(struct objects *all)
+{
+    for (size_t o = 0; all->sources && o < all->count; o++)
+        render_gather_sources_end(&all->sources[o]);
+    free(all->objects);
+    free(all->sources);
+    free(all->statuses);
+    free((void *)all->media);
+    free(all->samples);
+    free(all->first);
+}
+
+static bool objects_init(const struct render_gatherer *gatherer, const struct render_plan *plan,
+                         struct render_splatter *splatter, struct objects *all, dipole_status *status)
+{
+    *all = (struct objects){ .count = plan->has_object_ids ? plan->media->object_count : 1 };
+    all->objects = calloc(all->count, sizeof *all->objects);
+    all->sources = calloc(all->count, sizeof *all->sources);
+    all->statuses = calloc(all->count, sizeof *all->statuses);
+    all->media = calloc(all->count, sizeof(const struct render_plan_medium *));
+    all->first = calloc(all->count + 1, sizeof *all->first);
+    if (!all->objects || !all->sources || !all->statuses || !all->media || !all->first)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to gather for %zu objects",
+                           all->count);
+    describe_objects(gatherer, plan, all);
+    if (!share_out_samples(gatherer, splatter, all, status))
+        return false;
+    lut_parallel_for((int)all->count, 0, sort_object, all);
+    for (size_t o = 0; o < all->count; o++) {
+        if (all->statuses[o].code != DIPOLE_OK)
+            return dipole_fail(status, all->statuses[o].code, NULL, "%s", all->statuses[o].message);
+    }
+    return true;
+}
+
+/* ---- a frame ------------------------------------------------------------------------------------ */
+
+static bool gather(struct render_gatherer *gatherer, const struct render_frame *frame,
+                   const struct objects *all, dipole_status *status)
+{
+    const struct render_plan *const plan = frame->plan;
+    const size_t size = (size_t)plan->width_px * (size_t)plan->height_px * 4 * sizeof(float);
+    float *const position_mm = malloc(size), *const radiosity = calloc(1, size);
+    const struct render_gather_request request = { .width_px = plan->width_px,
+                                                   .height_px = plan->height_px,
+                                                   .position_mm = position_mm,
+                                                   .objects = all->objects,
+                                                   .object_count = all->count,
+                                                   .epsilon = plan->interpolation_epsilon,
+                                                   .own_epsilon = OWN_SHARE * plan->epsilon };
+    bool done = position_mm && radiosity;
+    if (done) {
+        glGetTextureImage(render_executor_texture(frame->executor, "position_mm"), 0, GL_RGBA, GL_FLOAT,
+                          (GLsizei)size, position_mm);
+        done = render_gather_run(&request, radiosity, &gatherer->counts, status);
+    } else {
+        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the places of %dx%d pixels",
+                    plan->width_px, plan->height_px);
+    }
+    if (done)
+        glTextureSubImage2D(render_executor_texture(frame->executor, "radiosity"), 0, 0, 0, plan->width_px,
+                            plan->height_px, GL_RGBA, GL_FLOAT, radiosity);
+    free(position_mm);
+    free(radiosity);
+    return done;
+}
+
+bool render_gatherer_run(struct render_gatherer *gatherer, const struct render_frame *frame,
+                         dipole_status *status)
+{
+    struct render_splatter *splatter;
+    struct objects all;
+    if (!render_executor_need_splatter(frame, &splatter, status) || !prepare_media(gatherer, frame, status))
+        return false;
+    const bool done = objects_init(gatherer, frame->plan, splatter, &all, status) &&
+                      gather(gatherer, frame, &all, status);
+    objects_end(&all);
+    return done;
+}

@@ -1,0 +1,22 @@
+/* Gathers a frame's light samples for its pixels: the state that is kept between frames. */
+#ifndef RENDERER_GATHER_DRAW_H
+#define RENDERER_GATHER_DRAW_H
+
+#include "renderer/execute.h"
+#include "renderer/gather.h"
+
+struct render_gatherer;
+
+/* Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_gatherer_create(const struct render_media *media,
+                                           struct render_gatherer **gatherer_out, dipole_status *status);
+void render_gatherer_destroy(struct render_gatherer *gatherer);
+
+/* Read the pixels' places back, gather, and fill the texture of radiosity. Its context must be current. */
+DIPOLE_CHECKED bool render_gatherer_run(struct render_gatherer *gatherer, const struct render_frame *frame,
+                                        dipole_status *status);
+
+/* Of the last run. */
+const struct render_gather_counts *render_gatherer_counts(const struct render_gatherer *gatherer);
+
+#endif

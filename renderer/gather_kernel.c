@@ -1,0 +1,149 @@
+#include "renderer/gather_kernel.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* Of piece p: bits 22 to 24 of 1.0f are 6. */
+static int column(int piece)
+{
+    return (piece + 6) % RENDER_GATHER_PIECES;
+}
+
+/* u where piece p starts. */
+static double piece_start(int piece)
+{
+    return ldexp(piece % 2 ? 1.5 : 1.0, piece / 2);
+}
+
+/* The cubic through Chebyshev's nodes over -0.25..0.25, in powers. */
+static void fit_cubic(const double values[RENDER_GATHER_TERMS], double terms[RENDER_GATHER_TERMS])
+{
+    double chebyshev[RENDER_GATHER_TERMS] = { 0 };
+    for (int k = 0; k < RENDER_GATHER_TERMS; k++) {
+        for (int i = 0; i < RENDER_GATHER_TERMS; i++)
+            chebyshev[k] +=
+                (k > 0 ? 0.5 : 0.25) * values[i] * cos(PI * k * (i + 0.5) / RENDER_GATHER_TERMS);
+    }
+    const double scale = 4; /* 1 over the half width */
+    terms[0] = chebyshev[0] - chebyshev[2];
+    terms[1] = scale * (chebyshev[1] - 3 * chebyshev[3]);
+    terms[2] = scale * scale * 2 * chebyshev[2];
+    terms[3] = scale * scale * scale * 4 * chebyshev[3];
+}
+
+void render_gather_kernel_at(const struct render_gather_kernel *kernel, const float step_mm[3],
+                             const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT])
+{
+    const float x = step_mm[0], y = step_mm[1], z = step_mm[2];
+    const float *const m = spread_mm2;
+    const float distance2_mm2 = x * x + y * y + z * z;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        rgb_out[c] = 0;
+    if (!(distance2_mm2 <= kernel->reach2_mm2))
+        return;
+    const float u = 1 + distance2_mm2 * kernel->inverse_per_mm2;
+    uint32_t bits;
+    memcpy(&bits, &u, sizeof bits);
+    const uint32_t piece = bits >> 22 & (RENDER_GATHER_PIECES - 1);
+    bits = (bits & 0x3fffffu) | 0x3f800000u;
+    float t;
+    memcpy(&t, &bits, sizeof t);
+    t -= 1.25f;
+    const float slope = kernel->slope[piece];
+    const float along =
+        x * (m[0] * x + 2 * (m[4] * z + m[5] * y)) + y * (m[1] * y + 2 * m[3] * z) + m[2] * z * z;
+    const float trace = m[0] + m[1] + m[2];
+    const float first = slope * trace, second = 4 * slope * slope * along;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
+        const float t0 = terms[0][piece], t1 = terms[1][piece], t2 = terms[2][piece], t3 = terms[3][piece];
+        const float half_bend = t2 + 3 * t * t3; /* of the cubic */
+        rgb_out[c] =
+            t0 + t * (t1 + t * (t2 + t * t3)) + first * (t1 + t * (half_bend + t2)) + second * half_bend;
+        rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * trace;
+    }
+}
+
+/* Power that leaves by the band, of a flat surface whose sources are spread by as much in all its
+ * directions; NULL: as the split says, without spread. */
+static void power_of(const struct render_split *split, int band, const struct render_gather_kernel *kernel,
+                     double spread_mm2, double power[IO_CHANNEL_COUNT])
+{
+    enum { STEPS = 256 };
+    const float m = (float)spread_mm2, spread[6] = { m, m, 0, 0, 0, 0 };
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        power[c] = 0;
+    for (int i = 0; i < STEPS; i++) {
+        const double r_mm = (i + 0.5) / STEPS * split->bands[band].r_outer_mm;
+        const float step_mm[3] = { (float)r_mm, 0, 0 };
+        float summed[IO_CHANNEL_COUNT];
+        double exact[IO_CHANNEL_COUNT];
+        if (kernel)
+            render_gather_kernel_at(kernel, step_mm, spread, summed);
+        else
+            render_split_band_per_mm2(split, band, r_mm, exact);
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            power[c] += r_mm * (kernel ? (double)summed[c] : exact[c]);
+    }
+}
+
+/* Cubics miss a little of the power, most where the profile has no value at 0. And spreading light moves it
+ * and takes none away; but derivatives of piecewise cubics jump, and so they do. */
+static void keep_power(const struct render_split *split, int band, struct render_gather_kernel *kernel)
+{
+    const double spacing_mm = split->bands[band].spacing_mm, spread_mm2 = spacing_mm * spacing_mm / 12;
+    double exact[IO_CHANNEL_COUNT], narrow[IO_CHANNEL_COUNT], wide[IO_CHANNEL_COUNT];
+    power_of(split, band, NULL, 0, exact);
+    power_of(split, band, kernel, 0, narrow);
+    power_of(split, band, kernel, spread_mm2, wide);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!(narrow[c] > 0))
+            continue;
+        kernel->lost_per_mm2[c] = (float)((1 - wide[c] / narrow[c]) / (2 * spread_mm2));
+        for (int k = 0; k < RENDER_GATHER_TERMS; k++) {
+            for (int p = 0; p < RENDER_GATHER_PIECES; p++)
+                kernel->terms[c][k][p] *= (float)(exact[c] / narrow[c]);
+        }
+    }
+}
+
+void render_gather_kernel_init(const struct render_split *split, int band,
+                               struct render_gather_kernel *kernel)
+{
+    const struct render_band *const planned = &split->bands[band];
+    /* A cap ends where the fifth piece starts, at u = 4, the band as a rule at 13. */
+    const double width_mm = fmax(planned->r_outer_mm, 2 * planned->cap_mm);
+    const double inverse = 12 / (width_mm * width_mm);
+    *kernel =
+        (struct render_gather_kernel){ .inverse_per_mm2 = (float)inverse,
+                                       .reach2_mm2 = (float)(planned->r_outer_mm * planned->r_outer_mm) };
+    for (int p = 0; p < RENDER_GATHER_PIECES; p++) {
+        kernel->slope[column(p)] = (float)ldexp(inverse, -(p / 2));
+        double values[IO_CHANNEL_COUNT][RENDER_GATHER_TERMS], terms[RENDER_GATHER_TERMS];
+        for (int i = 0; i < RENDER_GATHER_TERMS; i++) {
+            const double part = 0.25 * cos(PI * (i + 0.5) / RENDER_GATHER_TERMS); /* of the mantissa */
+            const double u = piece_start(p) + ldexp(part + 0.25, p / 2);
+            double rgb[IO_CHANNEL_COUNT];
+            render_split_band_per_mm2(split, band, fmin(sqrt((u - 1) / inverse), planned->r_outer_mm), rgb);
+            for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+                values[c][i] = rgb[c];
+        }
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+            fit_cubic(values[c], terms);
+            for (int k = 0; k < RENDER_GATHER_TERMS; k++)
+                kernel->terms[c][k][column(p)] = (float)terms[k];
+        }
+    }
+    keep_power(split, band, kernel);
+}
+
+const struct render_gather_loops *render_gather_loops_best(void)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return &render_gather_loops_avx2;
+#endif
+    return &render_gather_loops_portable;
+}

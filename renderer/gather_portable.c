@@ -1,0 +1,38 @@
+/* For any processor. */
+#include "renderer/gather_kernel.h"
+
+static unsigned near(const struct render_gather_group *group, const struct render_gather_box *box,
+                     float reach2_mm2)
+{
+    unsigned bits = 0;
+    for (unsigned i = 0; i < RENDER_GATHER_LANES; i++) {
+        float distance2 = 0;
+        for (int k = 0; k < 3; k++) {
+            const float x = group->position_mm[k][i];
+            const float below = box->min_mm[k] - x, above = x - box->max_mm[k];
+            const float gap = below > above ? below : above;
+            distance2 += gap > 0 ? gap * gap : 0;
+        }
+        bits |= distance2 <= reach2_mm2 ? 1u << i : 0;
+    }
+    return bits;
+}
+
+static void sum(const struct render_gather_kernel *kernel,
+                const struct render_gather_source *const *sources, size_t count,
+                struct render_gather_places *places)
+{
+    for (size_t s = 0; s < count; s++) {
+        const struct render_gather_source *const source = sources[s];
+        for (int i = 0; i < RENDER_GATHER_LANES; i++) {
+            float step_mm[3], rgb[IO_CHANNEL_COUNT];
+            for (int k = 0; k < 3; k++)
+                step_mm[k] = places->position_mm[k][i] - source->position_mm[k];
+            render_gather_kernel_at(kernel, step_mm, source->spread_mm2, rgb);
+            for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+                places->sums[c][i] += source->flux_w[c] * rgb[c];
+        }
+    }
+}
+
+const struct render_gather_loops render_gather_loops_portable = { near, sum };

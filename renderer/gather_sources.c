@@ -1,0 +1,313 @@
+#include "renderer/gather_sources.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    AXIS_BITS = 21,
+    ORDER_BITS =
+        3, /* cubes by which samples are ordered are 2^3 times smaller than the second band's spacing */
+    DIGIT_BITS = 11,
+    DIGITS = 1 << DIGIT_BITS,
+};
+
+/* ---- order -------------------------------------------------------------------------------------- */
+
+/* A sample's cube as its place on the Z-order curve. */
+struct key {
+    uint64_t code;
+    uint32_t index;
+};
+
+/* Put two zeros between the low 21 bits. */
+static uint64_t spread_bits(uint64_t x)
+{
+    x &= 0x1fffff;
+    x = (x | x << 32) & 0x001f00000000ffff;
+    x = (x | x << 16) & 0x001f0000ff0000ff;
+    x = (x | x << 8) & 0x100f00f00f00f00f;
+    x = (x | x << 4) & 0x10c30c30c30c30c3;
+    return (x | x << 2) & 0x1249249249249249;
+}
+
+static uint64_t cube_code(const float position_mm[3], const double min_mm[3], double cell_mm)
+{
+    uint64_t code = 0;
+    for (int k = 0; k < 3; k++) {
+        const double cell = ((double)position_mm[k] - min_mm[k]) / cell_mm;
+        code |= spread_bits((uint64_t)fmin(cell, 0x1fffff)) << k;
+    }
+    return code;
+}
+
+/* Stable, digit by digit; those in which no two codes differ are left out. Swaps *keys and *spare. */
+static void sort_keys(struct key **keys, struct key **spare, size_t count)
+{
+    uint64_t differ = 0;
+    for (size_t i = 1; i < count; i++)
+        differ |= (*keys)[i].code ^ (*keys)[0].code;
+    for (int shift = 0; shift < 3 * AXIS_BITS; shift += DIGIT_BITS) {
+        if (!(differ >> shift & (DIGITS - 1)))
+            continue;
+        size_t ends[DIGITS] = { 0 };
+        for (size_t i = 0; i < count; i++)
+            ends[(*keys)[i].code >> shift & (DIGITS - 1)]++;
+        size_t start = 0;
+        for (int d = 0; d < DIGITS; d++) {
+            const size_t in_digit = ends[d];
+            ends[d] = start;
+            start += in_digit;
+        }
+        for (size_t i = 0; i < count; i++)
+            (*spare)[ends[(*keys)[i].code >> shift & (DIGITS - 1)]++] = (*keys)[i];
+        struct key *const sorted = *spare;
+        *spare = *keys;
+        *keys = sorted;
+    }
+}
+
+static void fill_keys(const struct render_light_sample *samples, size_t count, double cell_mm,
+                      struct key *keys)
+{
+    double min_mm[3] = { INFINITY, INFINITY, INFINITY };
+    for (size_t i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++)
+            min_mm[k] = fmin(min_mm[k], (double)samples[i].position_mm[k]);
+    }
+    for (size_t i = 0; i < count; i++)
+        keys[i] = (struct key){ cube_code(samples[i].position_mm, min_mm, cell_mm), (uint32_t)i };
+}
+
+/* ---- merging ------------------------------------------------------------------------------------ */
+
+/* Brightness, whatever the colour: what a mean position is weighted by. */
+static double weight_of(const struct render_gather_source *source)
+{
+    return (double)source->flux_w[0] + (double)source->flux_w[1] + (double)source->flux_w[2];
+}
+
+static struct render_gather_source merge_run(const struct render_gather_source *sources, size_t count)
+{
+    static const int rows[6][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 1, 2 }, { 2, 0 }, { 0, 1 } };
+    double flux_w[3] = { 0, 0, 0 }, mean_mm[3] = { 0, 0, 0 }, spread_mm2[6] = { 0, 0, 0, 0, 0, 0 },
+           weight_sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double weight = weight_of(&sources[i]);
+        weight_sum += weight;
+        for (int k = 0; k < 3; k++) {
+            flux_w[k] += (double)sources[i].flux_w[k];
+            mean_mm[k] += weight * (double)sources[i].position_mm[k];
+        }
+    }
+    if (count == 1 || !(weight_sum > 0))
+        return sources[0];
+    for (int k = 0; k < 3; k++)
+        mean_mm[k] /= weight_sum;
+    for (size_t i = 0; i < count; i++) {
+        const double part = weight_of(&sources[i]) / weight_sum;
+        double step_mm[3];
+        for (int k = 0; k < 3; k++)
+            step_mm[k] = (double)sources[i].position_mm[k] - mean_mm[k];
+        for (int m = 0; m < 6; m++)
+            spread_mm2[m] +=
+                part * ((double)sources[i].spread_mm2[m] + step_mm[rows[m][0]] * step_mm[rows[m][1]]);
+    }
+    struct render_gather_source merged;
+    for (int k = 0; k < 3; k++) {
+        merged.position_mm[k] = (float)mean_mm[k];
+        merged.flux_w[k] = (float)flux_w[k];
+    }
+    for (int m = 0; m < 6; m++)
+        merged.spread_mm2[m] = (float)spread_mm2[m];
+    return merged;
+}
+
+/* Merge in place those that share a cube; returns how many there are left. */
+static size_t merge(struct render_gather_source *sources, uint64_t *codes, size_t count, int shift)
+{
+    size_t kept = 0;
+    for (size_t first = 0, end; first < count; first = end) {
+        end = first + 1;
+        while (end < count && codes[end] >> shift == codes[first] >> shift)
+            end++;
+        sources[kept] = merge_run(sources + first, end - first);
+        codes[kept++] = codes[first];
+    }
+    return kept;
+}
+
+/* ---- groups and boxes --------------------------------------------------------------------------- */
+
+static void box_add(struct render_gather_box *box, const float min_mm[3], const float max_mm[3])
+{
+    for (int k = 0; k < 3; k++) {
+        box->min_mm[k] = fminf(box->min_mm[k], min_mm[k]);
+        box->max_mm[k] = fmaxf(box->max_mm[k], max_mm[k]);
+    }
+}
+
+static void fill_group(const struct render_gather_source *sources, size_t count,
+                       struct render_gather_group *group, struct render_gather_box *box)
+{
+    const float *const at = sources[0].position_mm;
+    *box = (struct render_gather_box){ { at[0], at[1], at[2] }, { at[0], at[1], at[2] } };
+    for (size_t i = 0; i < RENDER_GATHER_LANES; i++) {
+        const struct render_gather_source *const source = &sources[i < count ? i : count - 1];
+        group->sources[i] = *source;
+        for (int c = 0; c < IO_CHANNEL_COUNT && i >= count; c++)
+            group->sources[i].flux_w[c] = 0;
+        for (int k = 0; k < 3; k++)
+            group->position_mm[k][i] = i < count ? source->position_mm[k] : INFINITY; /* near nothing */
+        box_add(box, source->position_mm, source->position_mm);
+    }
+}
+
+static bool level_init(const struct render_gather_source *sources, size_t count,
+                       struct render_gather_level *level)
+{
+    level->source_count = count;
+    level->group_count = (count + RENDER_GATHER_LANES - 1) / RENDER_GATHER_LANES;
+    if (count == 0)
+        return true;
+    size_t box_count = level->group_count, total = 0;
+    while (level->depth < RENDER_GATHER_DEPTH) {
+        level->box_counts[level->depth++] = box_count;
+        total += box_count;
+        if (box_count == 1)
+            break;
+        box_count = (box_count + RENDER_GATHER_FAN - 1) / RENDER_GATHER_FAN;
+    }
+    assert(level->box_counts[level->depth - 1] == 1);
+    level->groups =
+        aligned_alloc(_Alignof(struct render_gather_group), level->group_count * sizeof *level->groups);
+    level->boxes[0] = calloc(total + 1, sizeof *level->boxes[0]);
+    if (!level->groups || !level->boxes[0])
+        return false;
+    for (size_t g = 0; g < level->group_count; g++) {
+        const size_t first = g * RENDER_GATHER_LANES, left = count - first;
+        fill_group(sources + first, left < RENDER_GATHER_LANES ? left : RENDER_GATHER_LANES,
+                   &level->groups[g], &level->boxes[0][g]);
+    }
+    for (int d = 1; d < level->depth; d++) {
+        level->boxes[d] = level->boxes[d - 1] + level->box_counts[d - 1];
+        for (size_t i = 0; i < level->box_counts[d - 1]; i++) {
+            const struct render_gather_box *const below = &level->boxes[d - 1][i];
+            struct render_gather_box *const box = &level->boxes[d][i / RENDER_GATHER_FAN];
+            if (i % RENDER_GATHER_FAN == 0)
+                *box = *below;
+            box_add(box, below->min_mm, below->max_mm);
+        }
+    }
+    return true;
+}
+
+/* ---- all bands ---------------------------------------------------------------------------------- */
+
+/* What the bands are made in: sources in order, and their codes. */
+struct workshop {
+    struct render_gather_source *sources;
+    uint64_t *codes;
+    struct key *keys, *spare;
+};
+
+static bool fill_levels(const struct render_light_sample *samples, size_t count,
+                        const struct render_band *bands, int band_count, struct workshop *shop,
+                        struct render_gather_sources *sources)
+{
+    const double finest_mm = bands[0].spacing_mm;
+    fill_keys(samples, count, ldexp(finest_mm, 1 - ORDER_BITS), shop->keys);
+    sort_keys(&shop->keys, &shop->spare, count);
+    for (size_t i = 0; i < count; i++) {
+        const struct render_light_sample *const sample = &samples[shop->keys[i].index];
+        shop->codes[i] = shop->keys[i].code;
+        shop->sources[i] = (struct render_gather_source){ .spread_mm2 = { 0 } };
+        memcpy(shop->sources[i].position_mm, sample->position_mm, sizeof sample->position_mm);
+        memcpy(shop->sources[i].flux_w, sample->flux_w, sizeof sample->flux_w);
+    }
+    for (int b = 0; b < band_count; b++) {
+        count = merge(shop->sources, shop->codes, count, 3 * (ORDER_BITS + b - 1));
+        if (!level_init(shop->sources, count, &sources->levels[b]))
+            return false;
+    }
+    return true;
+}
+
+bool render_gather_sources_init(const struct render_light_sample *samples, size_t count,
+                                const struct render_band *bands, int band_count,
+                                struct render_gather_sources *sources, dipole_status *status)
+{
+    *sources = (struct render_gather_sources){ .band_count = band_count };
+    if (count == 0)
+        return true;
+    struct workshop shop = { .sources = calloc(count, sizeof *shop.sources),
+                             .codes = calloc(count, sizeof *shop.codes),
+                             .keys = calloc(count, sizeof *shop.keys),
+                             .spare = calloc(count, sizeof *shop.spare) };
+    const bool done = shop.sources && shop.codes && shop.keys && shop.spare &&
+                      fill_levels(samples, count, bands, band_count, &shop, sources);
+    free(shop.sources);
+    free(shop.codes);
+    free(shop.keys);
+    free(shop.spare);
+    return done ||
+           dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to order %zu light samples", count);
+}
+
+void render_gather_sources_end(struct render_gather_sources *sources)
+{
+    for (int b = 0; b < sources->band_count; b++) {
+        free(sources->levels[b].groups);
+        free(sources->levels[b].boxes[0]);
+    }
+    *sources = (struct render_gather_sources){ 0 };
+}
+
+/* ---- finding ------------------------------------------------------------------------------------ */
+
+static bool is_near(const struct render_gather_box *a, const struct render_gather_box *b, float reach2_mm2)
+{
+    float distance2 = 0;
+    for (int k = 0; k < 3; k++) {
+        const float below = a->min_mm[k] - b->max_mm[k], above = b->min_mm[k] - a->max_mm[k];
+        const float gap = below > above ? below : above;
+        distance2 += gap > 0 ? gap * gap : 0;
+    }
+    return distance2 <= reach2_mm2;
+}
+
+size_t render_gather_find(const struct render_gather_level *level, const struct render_gather_box *box,
+                          float reach_mm, uint32_t *groups, size_t capacity)
+{
+    /* Each box opened leaves at most RENDER_GATHER_FAN - 1 more to look at. */
+    struct {
+        int depth;
+        uint32_t index;
+    } stack[RENDER_GATHER_DEPTH * RENDER_GATHER_FAN];
+    size_t count = 0, height = 0;
+    if (level->depth > 0 && is_near(&level->boxes[level->depth - 1][0], box, reach_mm * reach_mm)) {
+        stack[height].depth = level->depth - 1;
+        stack[height++].index = 0;
+    }
+    while (height > 0) {
+        const int depth = stack[--height].depth;
+        const uint32_t index = stack[height].index;
+        if (depth == 0) {
+            if (count < capacity)
+                groups[count] = index;
+            count++;
+            continue;
+        }
+        const size_t first = (size_t)index * RENDER_GATHER_FAN, below_count = level->box_counts[depth - 1];
+        const size_t end =
+            first + RENDER_GATHER_FAN < below_count ? first + RENDER_GATHER_FAN : below_count;
+        for (size_t i = end; i-- > first;) { /* the last first, so that groups come out in order */
+            if (is_near(&level->boxes[depth - 1][i], box, reach_mm * reach_mm)) {
+                stack[height].depth = depth - 1;
+                stack[height++].index = (uint32_t)i;
+            }
+        }
+    }
+    return count;
+}

@@ -1,0 +1,449 @@
+/* renderer/gather*.c: what is gathered, against direct sums. */
+#include "profiles.h"
+
+#include "renderer/gather.h"
+
+/* ---- what the tests share ----------------------------------------------------------------------- */
+
+/* A picture of a wavy surface, lit in patches. */
+enum { SIDE_PX = 96 };
+struct scenery {
+    struct test_profile profile;
+    struct render_band bands[RENDER_BAND_LIMIT];
+    int band_count;
+    struct render_gather_medium medium;
+    struct render_light_sample *samples;
+    size_t sample_count;
+    float *position_mm; /* as request.position_mm */
+    double pixel_mm;
+};
+
+static double height_mm(double x_mm, double y_mm, double width_mm)
+{
+    return 0.08 * width_mm * sin(7 * x_mm / width_mm) * cos(5 * y_mm / width_mm);
+}
+
+/* width_mm: of the picture; a step in the middle, a tenth of it high; a border without objects. */
+static void scenery_init(struct scenery *scenery, const char *name, dipole_model model, double width_mm,
+                         double cap_spacings)
+{
+    profile_init(&scenery->profile, name, model, 0.01);
+    const struct test_profile *const profile = &scenery->profile;
+    const double r_max_mm = fmin(profile->r_max_mm, 2 * width_mm);
+    scenery->band_count = render_bands_make(RENDER_GATHER_FINEST * profile->spacing_mm, r_max_mm,
+                                            cap_spacings, scenery->bands);
+    assert_true(render_gather_medium_init(&profile->source, scenery->bands, scenery->band_count,
+                                          &scenery->medium, NULL));
+    const int side = (int)fmin(ceil(width_mm / profile->spacing_mm), 400);
+    scenery->samples = calloc((size_t)side * (size_t)side, sizeof *scenery->samples);
+    scenery->sample_count = 0;
+    struct rng rng = { .seed = 5 };
+    for (int i = 0; i < side * side; i++) {
+        const double x = (i % side + 0.5) * width_mm / side, y = (i / side + 0.5) * width_mm / side;
+        if (x > 0.3 * width_mm && x < 0.45 * width_mm)
+            continue; /* a shadow */
+        struct render_light_sample *const sample = &scenery->samples[scenery->sample_count++];
+        const double area_mm2 = width_mm * width_mm / side / side;
+        sample->position_mm[0] = (float)x;
+        sample->position_mm[1] = (float)y;
+        sample->position_mm[2] =
+            (float)(height_mm(x, y, width_mm) + (x > 0.6 * width_mm ? 0.1 * width_mm : 0));
+        for (int c = 0; c < 3; c++)
+            sample->flux_w[c] = (float)(area_mm2 * uniform(&rng, 0.8, 1.2));
+    }
+    scenery->position_mm = calloc(SIDE_PX * SIDE_PX, 4 * sizeof *scenery->position_mm);
+    scenery->pixel_mm = width_mm / SIDE_PX;
+    for (int i = 0; i < SIDE_PX * SIDE_PX; i++) {
+        const int column = i % SIDE_PX, row = i / SIDE_PX;
+        const double x = (column + 0.5) * scenery->pixel_mm, y = (row + 0.5) * scenery->pixel_mm;
+        if (column < 5 || row < 3)
+            continue;
+        float *const place = scenery->position_mm + 4 * i;
+        place[0] = (float)x;
+        place[1] = (float)y;
+        place[2] = (float)(height_mm(x, y, width_mm) + (x > 0.6 * width_mm ? 0.1 * width_mm : 0));
+        place[3] = 1;
+    }
+}
+
+static void scenery_end(struct scenery *scenery)
+{
+    profile_end(&scenery->profile);
+    free(scenery->samples);
+    free(scenery->position_mm);
+}
+
+static float *gathered(const struct scenery *scenery, double epsilon, int thread_count,
+                       struct render_gather_counts *counts)
+{
+    float *const radiosity = calloc(SIDE_PX * SIDE_PX, 4 * sizeof *radiosity);
+    struct render_gather_sources sources;
+    assert_true(render_gather_sources_init(scenery->samples, scenery->sample_count, scenery->bands,
+                                           scenery->band_count, &sources, NULL));
+    const struct render_gather_object object = { &scenery->medium, &sources, scenery->pixel_mm };
+    const struct render_gather_request request = { .width_px = SIDE_PX,
+                                                   .height_px = SIDE_PX,
+                                                   .position_mm = scenery->position_mm,
+                                                   .objects = &object,
+                                                   .object_count = 1,
+                                                   .epsilon = epsilon,
+                                                   .own_epsilon = 20 * epsilon,
+                                                   .thread_count = thread_count };
+    assert_true(render_gather_run(&request, radiosity, counts, NULL));
+    render_gather_sources_end(&sources);
+    return radiosity;
+}
+
+struct error {
+    double rmse, max, bias;
+};
+
+/* Of every channel, relative to the brightest: direct sums over all samples at every 41st pixel. */
+static struct error error_of(const struct scenery *scenery, const float *radiosity)
+{
+    double bias = 0, sum = 0, square = 0, square_expected = 0, largest = 0, brightest = 0;
+    for (int i = 0; i < SIDE_PX * SIDE_PX; i += 41) {
+        const float *const place = scenery->position_mm + 4 * i;
+        double expected[3] = { 0, 0, 0 };
+        for (size_t s = 0; s < scenery->sample_count && place[3] > 0; s++) {
+            const struct render_light_sample *const sample = &scenery->samples[s];
+            double square_mm2 = 0, rgb[3];
+            for (int k = 0; k < 3; k++)
+                square_mm2 += pow((double)place[k] - (double)sample->position_mm[k], 2);
+            lut_splat_sample(scenery->profile.table, 0, sqrt(square_mm2), rgb);
+            for (int c = 0; c < 3; c++)
+                expected[c] += (double)sample->flux_w[c] * rgb[c];
+        }
+        for (int c = 0; c < 3; c++) {
+            const double error = (double)radiosity[4 * i + c] - expected[c];
+            bias += error;
+            sum += expected[c];
+            square += error * error;
+            square_expected += expected[c] * expected[c];
+            largest = fmax(largest, fabs(error));
+            brightest = fmax(brightest, expected[c]);
+        }
+    }
+    return (struct error){ sqrt(square / square_expected), largest / brightest, bias / sum };
+}
+
+/* ---- kernels ------------------------------------------------------------------------------------ */
+
+/* Oracle: the split. A band's cubics are within 0.6 % of the profile from that band on. */
+static void kernels_follow_the_bands(void **state)
+{
+    (void)state;
+    static const dipole_model models[] = { DIPOLE_MODEL_DIPOLE, DIPOLE_MODEL_BEAM, DIPOLE_MODEL_MODES };
+    for (size_t m = 0; m < BUNDLED_COUNT; m++) {
+        struct test_profile profile;
+        struct render_band bands[RENDER_BAND_LIMIT];
+        struct render_split split;
+        profile_init(&profile, bundled[m], models[m % COUNT(models)], 0.01);
+        const int count =
+            render_bands_make(RENDER_GATHER_FINEST * profile.spacing_mm, profile.r_max_mm, 2, bands);
+        assert_true(render_split_init(&profile.source, bands, count, &split, NULL));
+        bool has_core = false;
+        for (int c = 0; c < 3; c++)
+            has_core |= profile.table->rows[0].core_mm[c] > 0;
+        for (int b = 0; b < count; b++) {
+            struct render_gather_kernel kernel;
+            double power = 0, summed = 0;
+            render_gather_kernel_init(&split, b, &kernel);
+            for (double part = 0.001; part < 1; part += 0.003) {
+                const double r_mm = part * bands[b].r_outer_mm;
+                const float step_mm[3] = { 0, (float)r_mm, 0 }, spread_mm2[6] = { 0 };
+                double expected[3], from[3], at_0[3];
+                float found[3];
+                render_split_band_per_mm2(&split, b, (double)step_mm[1], expected);
+                render_split_from_per_mm2(&split, b, (double)step_mm[1], from);
+                render_split_from_per_mm2(&split, 0, 0, at_0);
+                render_gather_kernel_at(&kernel, step_mm, spread_mm2, found);
+                /* a profile without a value at 0 bends more than a cubic in its first piece; its power is
+                 * kept */
+                const double tolerance = has_core && b == 0 ? (part < 0.3 ? INFINITY : 0.06) : 6e-3;
+                power += r_mm * expected[1];
+                summed += r_mm * (double)found[1];
+                for (int c = 0; c < 3; c++) {
+                    if (fabs((double)found[c] - expected[c]) > tolerance * from[c] + 1e-6 * at_0[c])
+                        fail_msg(
+                            "%s, band %d of %d at %g of its reach, channel %d: found %g, expected %g of %g",
+                            bundled[m], b, count, part, c, (double)found[c], expected[c], from[c]);
+                }
+            }
+            assert_close(summed, power, 3e-3, "power of %s in band %d", bundled[m], b);
+        }
+        render_split_end(&split);
+        profile_end(&profile);
+    }
+}
+
+/* Oracle: the portable loops. Those of this processor choose the same sources, and sum the same to float's
+ * precision. */
+static void loops_agree(void **state)
+{
+    (void)state;
+    struct test_profile profile;
+    struct render_band bands[RENDER_BAND_LIMIT];
+    struct render_split split;
+    struct render_gather_kernel kernel;
+    struct rng rng = { .seed = 3 };
+    profile_init(&profile, "skin1", DIPOLE_MODEL_DIPOLE, 0.01);
+    const int count = render_bands_make(profile.spacing_mm, profile.r_max_mm, 2, bands);
+    assert_true(render_split_init(&profile.source, bands, count, &split, NULL));
+    render_gather_kernel_init(&split, 1, &kernel);
+    const double reach_mm = bands[1].r_outer_mm;
+    const struct render_gather_loops *const plain = &render_gather_loops_portable,
+                                            *const best = render_gather_loops_best();
+    for (int trial = 0; trial < 2000; trial++) {
+        struct render_gather_group group;
+        struct render_gather_places places = { .sums = { { 0 } } };
+        const struct render_gather_source *list[RENDER_GATHER_LANES];
+        struct render_gather_box box;
+        for (int i = 0; i < RENDER_GATHER_LANES; i++) {
+            group.sources[i] = (struct render_gather_source){ .flux_w = { 1, 2, 3 } };
+            for (int k = 0; k < 6; k++)
+                group.sources[i].spread_mm2[k] = (float)uniform(&rng, 0, 0.01 * reach_mm * reach_mm);
+            for (int k = 0; k < 3; k++) {
+                group.sources[i].position_mm[k] = group.position_mm[k][i] =
+                    (float)uniform(&rng, -reach_mm, reach_mm);
+                places.position_mm[k][i] = (float)uniform(&rng, -reach_mm, reach_mm);
+                box.min_mm[k] = (float)uniform(&rng, -reach_mm, 0);
+                box.max_mm[k] = (float)uniform(&rng, 0, reach_mm);
+            }
+            list[i] = &group.sources[i];
+        }
+        for (int k = 0; k < 3; k++)
+            group.position_mm[k][7] = INFINITY; /* as those that fill a group up */
+        const float reach2_mm2 = (float)uniform(&rng, 0, reach_mm * reach_mm);
+        const unsigned bits = plain->near(&group, &box, reach2_mm2);
+        assert_int_equal(bits & 0x80, 0);
+        assert_int_equal(best->near(&group, &box, reach2_mm2), bits);
+        struct render_gather_places others = places;
+        plain->sum(&kernel, list, RENDER_GATHER_LANES, &places);
+        best->sum(&kernel, list, RENDER_GATHER_LANES, &others);
+        for (int c = 0; c < 3; c++) {
+            for (int i = 0; i < RENDER_GATHER_LANES; i++)
+                assert_true(fabsf(places.sums[c][i] - others.sums[c][i]) <=
+                            1e-5f * fabsf(kernel.terms[c][0][6]));
+        }
+    }
+    render_split_end(&split);
+    profile_end(&profile);
+}
+
+/* ---- sources ------------------------------------------------------------------------------------ */
+
+/* Oracle: sums over the samples. Whatever is merged, power, its first and its second moments stay. */
+static void merging_keeps_moments(void **state)
+{
+    (void)state;
+    enum { COUNT_OF_SAMPLES = 5003 };
+    struct rng rng = { .seed = 8 };
+    struct render_light_sample *const samples = calloc(COUNT_OF_SAMPLES, sizeof *samples);
+    struct render_band bands[RENDER_BAND_LIMIT];
+    struct render_gather_sources sources;
+    double expected[10] = { 0 };
+    for (int i = 0; i < COUNT_OF_SAMPLES; i++) {
+        for (int k = 0; k < 3; k++) {
+            samples[i].position_mm[k] = (float)uniform(&rng, -20, 20);
+            samples[i].flux_w[k] = (float)uniform(&rng, 0, 1);
+        }
+    }
+    const int count = render_bands_make(0.3, 60, 2, bands);
+    assert_true(render_gather_sources_init(samples, COUNT_OF_SAMPLES, bands, count, &sources, NULL));
+    for (int b = -1; b < count; b++) {
+        double sums[10] = { 0 };
+        const size_t source_count = b < 0 ? COUNT_OF_SAMPLES : sources.levels[b].source_count;
+        for (size_t i = 0; i < source_count; i++) {
+            struct render_gather_source source = { .spread_mm2 = { 0 } };
+            if (b < 0) {
+                memcpy(source.position_mm, samples[i].position_mm, sizeof source.position_mm);
+                memcpy(source.flux_w, samples[i].flux_w, sizeof source.flux_w);
+            } else {
+                source = sources.levels[b].groups[i / RENDER_GATHER_LANES].sources[i % RENDER_GATHER_LANES];
+            }
+            const double weight =
+                (double)source.flux_w[0] + (double)source.flux_w[1] + (double)source.flux_w[2];
+            sums[0] += weight;
+            for (int k = 0; k < 3; k++) {
+                const double x = (double)source.position_mm[k], y = (double)source.position_mm[(k + 1) % 3];
+                static const int mixed[3] = { 5, 3, 4 }; /* xy yz zx */
+                sums[1 + k] += weight * x;
+                sums[4 + k] += weight * (x * x + (double)source.spread_mm2[k]);
+                sums[7 + k] += weight * (x * y + (double)source.spread_mm2[mixed[k]]);
+            }
+        }
+        for (int i = 0; i < 10; i++) {
+            if (b < 0)
+                expected[i] = sums[i];
+            else /* float, of values up to 20 mm from 0 */
+                assert_true(fabs(sums[i] - expected[i]) <= 1e-5 * 400 * expected[0]);
+        }
+        if (b > 0)
+            assert_true(sources.levels[b].source_count < sources.levels[b - 1].source_count);
+    }
+    render_gather_sources_end(&sources);
+    free(samples);
+}
+
+/* Oracle: every group, one after the other. The tree finds just those whose samples' box is near. */
+static void the_tree_misses_nothing(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 12 };
+    for (int count = 0; count < 3000; count = 3 * count + 1) {
+        struct render_light_sample *const samples = calloc((size_t)count + 1, sizeof *samples);
+        struct render_band bands[RENDER_BAND_LIMIT];
+        struct render_gather_sources sources;
+        uint32_t found[4000];
+        for (int i = 0; i < count; i++) {
+            for (int k = 0; k < 3; k++) {
+                samples[i].position_mm[k] = (float)uniform(&rng, -20, 20);
+                samples[i].flux_w[k] = 1;
+            }
+        }
+        const int band_count = render_bands_make(0.01, 60, 2, bands);
+        assert_true(render_gather_sources_init(samples, (size_t)count, bands, band_count, &sources, NULL));
+        for (int trial = 0; trial < 50; trial++) {
+            struct render_gather_box box;
+            const float reach_mm = (float)log_uniform(&rng, 0.1, 30);
+            const struct render_gather_level *const level = &sources.levels[0];
+            for (int k = 0; k < 3; k++) {
+                box.min_mm[k] = (float)uniform(&rng, -25, 20);
+                box.max_mm[k] = box.min_mm[k] + (float)uniform(&rng, 0, 5);
+            }
+            const size_t found_count = render_gather_find(level, &box, reach_mm, found, COUNT(found));
+            size_t next = 0;
+            for (size_t g = 0; g < level->group_count; g++) {
+                const bool is_found = next < found_count && found[next] == g;
+                next += is_found;
+                if (!is_found)
+                    assert_int_equal(
+                        render_gather_loops_portable.near(&level->groups[g], &box, reach_mm * reach_mm), 0);
+            }
+            assert_int_equal(next, found_count);
+        }
+        render_gather_sources_end(&sources);
+        free(samples);
+    }
+}
+
+/* ---- pictures ----------------------------------------------------------------------------------- */
+
+/* Oracle: direct sums over all samples. Errors stay below those that the plan states (0.2 % of banding and
+ * 0.17 % of interpolation at epsilon = 0.01, relative RMSE; three times that at the worst pixel), near
+ * steps, too. */
+static void sums_are_right(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        dipole_model model;
+        double width_mm;
+    } cases[] = { { "marble", DIPOLE_MODEL_DIPOLE, 30 },    { "marble", DIPOLE_MODEL_BEAM, 60 },
+                  { "ketchup", DIPOLE_MODEL_DIPOLE, 60 },   { "skin1", DIPOLE_MODEL_DIPOLE, 10 },
+                  { "wholemilk", DIPOLE_MODEL_DIPOLE, 40 }, { "skimmilk", DIPOLE_MODEL_DIPOLE, 4 },
+                  { "spectralon", DIPOLE_MODEL_DIPOLE, 5 }, { "apple", DIPOLE_MODEL_BETTER_DIPOLE, 40 } };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        struct scenery scenery;
+        struct render_gather_counts counts;
+        scenery_init(&scenery, cases[i].name, cases[i].model, cases[i].width_mm,
+                     render_gather_cap_spacings(0.002));
+        float *const radiosity = gathered(&scenery, 0.0017, 0, &counts);
+        const struct error error = error_of(&scenery, radiosity);
+        print_message(
+            "  %-10s %3g mm, %6zu samples, %d bands: rmse %.2e, max %.2e, bias %+.1e; %zu places, %zu "
+            "refined, %zu sums\n",
+            cases[i].name, cases[i].width_mm, scenery.sample_count, scenery.band_count, error.rmse,
+            error.max, error.bias, counts.place_count, counts.refined_count, counts.evaluation_count);
+        assert_true(error.rmse < 0.0037);
+        assert_true(error.max < 3 * 0.0037);
+        assert_true(fabs(error.bias) < 1e-3);
+        free(radiosity);
+        scenery_end(&scenery);
+    }
+}
+
+/* Oracle: what is asked. Less error is allowed, more is summed; with none, nothing is interpolated. */
+static void interpolation_follows_epsilon(void **state)
+{
+    (void)state;
+    static const double epsilons[] = { 0.01, 0.001, 0 };
+    struct scenery scenery;
+    size_t before = 0;
+    scenery_init(&scenery, "wholemilk", DIPOLE_MODEL_DIPOLE, 10, 2);
+    for (size_t i = 0; i < COUNT(epsilons); i++) {
+        struct render_gather_counts counts;
+        float *const radiosity = gathered(&scenery, epsilons[i], 1, &counts);
+        assert_true(counts.evaluation_count > before);
+        before = counts.evaluation_count;
+        if (epsilons[i] == 0) {
+            assert_int_equal(counts.place_count, (SIDE_PX - 5) * (SIDE_PX - 3));
+            assert_int_equal(counts.refined_count, 0);
+        }
+        free(radiosity);
+    }
+    scenery_end(&scenery);
+}
+
+/* Oracle: one thread. Not a bit depends on how many there are. */
+static void threads_change_nothing(void **state)
+{
+    (void)state;
+    struct scenery scenery;
+    scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 2);
+    float *const one = gathered(&scenery, 0.002, 1, NULL), *const four = gathered(&scenery, 0.002, 4, NULL);
+    assert_memory_equal(one, four, SIDE_PX * SIDE_PX * 4 * sizeof *one);
+    free(one);
+    free(four);
+    scenery_end(&scenery);
+}
+
+/* Oracle: no light is dark, no object is 0, an object's light is its own. */
+static void light_stays_in_its_object(void **state)
+{
+    (void)state;
+    struct scenery scenery;
+    struct render_gather_sources lit, dark;
+    scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 2);
+    assert_true(render_gather_sources_init(scenery.samples, scenery.sample_count, scenery.bands,
+                                           scenery.band_count, &lit, NULL));
+    assert_true(render_gather_sources_init(NULL, 0, scenery.bands, scenery.band_count, &dark, NULL));
+    for (int i = 0; i < SIDE_PX * SIDE_PX; i++) {
+        if (scenery.position_mm[4 * i + 3] > 0)
+            scenery.position_mm[4 * i + 3] =
+                (float)(1 + i % SIDE_PX / 7 % 3); /* stripes of three objects */
+    }
+    const struct render_gather_object objects[] = { { &scenery.medium, &lit, scenery.pixel_mm },
+                                                    { &scenery.medium, &dark, scenery.pixel_mm },
+                                                    { NULL, NULL, 0 } };
+    const struct render_gather_request request = { .width_px = SIDE_PX,
+                                                   .height_px = SIDE_PX,
+                                                   .position_mm = scenery.position_mm,
+                                                   .objects = objects,
+                                                   .object_count = 3,
+                                                   .epsilon = 0.002,
+                                                   .own_epsilon = 0.04 };
+    float *const radiosity = calloc(SIDE_PX * SIDE_PX, 4 * sizeof *radiosity);
+    assert_true(render_gather_run(&request, radiosity, NULL, NULL));
+    for (int i = 0; i < SIDE_PX * SIDE_PX; i++) {
+        const bool is_lit = scenery.position_mm[4 * i + 3] == 1;
+        for (int c = 0; c < 3; c++)
+            assert_true(is_lit ? radiosity[4 * i + c] > 0 : radiosity[4 * i + c] == 0);
+    }
+    free(radiosity);
+    render_gather_sources_end(&lit);
+    render_gather_sources_end(&dark);
+    scenery_end(&scenery);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(kernels_follow_the_bands), cmocka_unit_test(loops_agree),
+        cmocka_unit_test(merging_keeps_moments),    cmocka_unit_test(the_tree_misses_nothing),
+        cmocka_unit_test(sums_are_right),           cmocka_unit_test(interpolation_follows_epsilon),
+        cmocka_unit_test(threads_change_nothing),   cmocka_unit_test(light_stays_in_its_object),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
