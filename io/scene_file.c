@@ -1,7 +1,7 @@
 #include "io/scene_file.h"
 
 #include "io/file.h"
-#include "io/scene_internal.h"
+#include "io/scene_motion.h"
 
 #include <limits.h>
 #include <math.h>
@@ -97,14 +97,14 @@ bool io_scene_read_light(const struct io_json *at, double unit_mm, struct io_lig
 
 /* ---- objects ------------------------------------------------------------------------------------- */
 
-/* Find the file that a scene refers to. */
-static bool resolve(const struct io_json *at, const struct io_scene_options *options, char out[PATH_MAX],
-                    dipole_status *status)
+/* Find the file that a scene refers to; at: where it says so. */
+static bool resolve_name(const struct io_json *at, const char *name, const struct io_scene_options *options,
+                         char out[PATH_MAX], dipole_status *status)
 {
     const dipole_place place = io_json_place(at);
     dipole_status found;
-    if (io_path_resolve(&place, json_string_value(at->value), options->allowed_paths,
-                        options->allowed_path_count, out, PATH_MAX, &found))
+    if (io_path_resolve(&place, name, options->allowed_paths, options->allowed_path_count, out, PATH_MAX,
+                        &found))
         return true;
     if (found.line > 0)
         return io_json_fail(at, found.code, status, "%s", found.message);
@@ -113,18 +113,29 @@ static bool resolve(const struct io_json *at, const struct io_scene_options *opt
     return false;
 }
 
-static bool read_mesh(const struct io_json *at, const struct io_scene_options *options,
-                      struct io_mesh **mesh, dipole_status *status)
+static bool resolve(const struct io_json *at, const struct io_scene_options *options, char out[PATH_MAX],
+                    dipole_status *status)
+{
+    return resolve_name(at, json_string_value(at->value), options, out, status);
+}
+
+bool io_scene_read_mesh(const struct io_json *at, const char *name, const struct io_scene_options *options,
+                        struct io_mesh **mesh, dipole_status *status)
 {
     char path[PATH_MAX];
     dipole_status found;
+    return resolve_name(at, name, options, path, status) &&
+           (io_mesh_read(path, mesh, &found) ||
+            io_json_fail(at, found.code, status, "\"%.120s\" %s", name, found.message));
+}
+
+static bool read_mesh(const struct io_json *at, const struct io_scene_options *options,
+                      struct io_mesh **mesh, dipole_status *status)
+{
     if (!json_is_string(at->value))
         return io_json_fail(at, DIPOLE_BAD_VALUE, status,
                             "is not a string, expected the path of a mesh file");
-    if (!resolve(at, options, path, status))
-        return false;
-    return io_mesh_read(path, mesh, &found) || io_json_fail(at, found.code, status, "\"%.120s\" %s",
-                                                            json_string_value(at->value), found.message);
+    return io_scene_read_mesh(at, json_string_value(at->value), options, mesh, status);
 }
 
 static bool create_primitive(const struct io_json *object, struct io_mesh **mesh, dipole_status *status)
@@ -154,8 +165,31 @@ static bool read_shape(const struct io_json *object, const struct io_scene_optio
         return io_json_fail(&detail, DIPOLE_BAD_VALUE, status,
                             "stands beside mesh, expected beside primitive");
     if (!file.value && !primitive.value)
-        return io_json_fail(&file, DIPOLE_BAD_VALUE, status, "is missing, expected it, or primitive");
+        return io_json_fail(&file, DIPOLE_BAD_VALUE, status,
+                            "is missing, expected it, primitive or mesh_sequence");
     return file.value ? read_mesh(&file, options, mesh, status) : create_primitive(object, mesh, status);
+}
+
+/* One mesh, or the first of a sequence, placed in the world; then what becomes of it frame by frame. */
+static bool read_shapes(const struct io_json *at, const struct io_scene_options *options,
+                        const struct io_scene *scene, double unit_mm, struct io_object *object,
+                        dipole_status *status)
+{
+    const struct io_json transform_at = io_json_member(at, "transform"),
+                         sequence = io_json_member(at, "mesh_sequence");
+    struct io_scene_transform transform;
+    if (!io_scene_read_transform(&transform_at, &transform, status))
+        return false;
+    if (!sequence.value && (!read_shape(at, options, &object->mesh, status) ||
+                            !io_scene_fit_mesh(at, object->mesh, &transform, status) ||
+                            !io_scene_place_mesh(at, &transform, unit_mm, object->mesh, status)))
+        return false;
+    const struct io_motion_reading reading = { .at = at,
+                                               .options = options,
+                                               .transform = &transform,
+                                               .unit_mm = unit_mm,
+                                               .frame_count = scene->frames.count };
+    return io_scene_read_motion(&reading, object, status);
 }
 
 static bool read_bundled_material(const struct io_json *at, struct io_material *material,
@@ -184,14 +218,14 @@ bool io_scene_read_material(const struct io_json *at, const struct io_scene_opti
     return resolve(at, options, path, status) && io_material_read(path, material, status);
 }
 
-static bool read_object(const struct io_json *at, const struct io_scene_options *options, double unit_mm,
-                        struct io_object *object, dipole_status *status)
+static bool read_object(const struct io_json *at, const struct io_scene_options *options,
+                        const struct io_scene *scene, double unit_mm, struct io_object *object,
+                        dipole_status *status)
 {
-    static const char *const known[] = { "material",  "mesh",      "primitive", "detail", "name",
-                                         "transform", "roughness", "specular",  NULL };
-    const struct io_json material = io_json_member(at, "material"),
-                         transform_at = io_json_member(at, "transform");
-    struct io_scene_transform transform;
+    static const char *const known[] = { "material",      "mesh",      "primitive", "detail",
+                                         "name",          "transform", "roughness", "specular",
+                                         "mesh_sequence", "deform",    "motion",    NULL };
+    const struct io_json material = io_json_member(at, "material");
     *object = (struct io_object){ .roughness = IO_SCENE_ROUGHNESS, .has_specular = true };
     if (!io_json_check_object(at, known, 1, status))
         return false;
@@ -203,10 +237,8 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
     return io_json_get_text(at, "name", object->name, sizeof object->name, status) &&
            io_json_get_number(at, "roughness", 0.05, 1, &object->roughness, status) &&
            io_json_get_bool(at, "specular", &object->has_specular, status) &&
-           io_scene_read_transform(&transform_at, &transform, status) &&
            io_scene_read_material(&material, options, &object->material, status) &&
-           read_shape(at, options, &object->mesh, status) &&
-           io_scene_place_mesh(at, &transform, unit_mm, object->mesh, status);
+           read_shapes(at, options, scene, unit_mm, object, status);
 }
 
 /* ---- scenes -------------------------------------------------------------------------------------- */
@@ -267,14 +299,6 @@ static bool read_lights(const struct io_json *at, double unit_mm, struct io_scen
     return true;
 }
 
-static void grow_box(struct io_scene *scene, const struct io_mesh *mesh)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        scene->min_mm[axis] = fmin(scene->min_mm[axis], (double)mesh->min[axis]);
-        scene->max_mm[axis] = fmax(scene->max_mm[axis], (double)mesh->max[axis]);
-    }
-}
-
 static bool read_objects(const struct io_json *at, const struct io_scene_options *options, double unit_mm,
                          struct io_scene *scene, dipole_status *status)
 {
@@ -284,23 +308,19 @@ static bool read_objects(const struct io_json *at, const struct io_scene_options
     scene->objects = calloc(count, sizeof *scene->objects);
     if (!scene->objects)
         return io_json_fail(at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
-    for (int axis = 0; axis < 3; axis++) {
-        scene->min_mm[axis] = INFINITY;
-        scene->max_mm[axis] = -INFINITY;
-    }
     while (scene->object_count < count) {
         const struct io_json element = io_json_element(at, scene->object_count);
         struct io_object *object =
             &scene->objects[scene->object_count++]; /* counted first: its mesh is ours */
-        if (!read_object(&element, options, unit_mm, object, status))
+        if (!read_object(&element, options, scene, unit_mm, object, status))
             return false;
-        triangle_count += object->mesh->triangle_count;
+        triangle_count += io_scene_triangle_count(object);
         if (triangle_count > IO_MESH_TRIANGLE_LIMIT)
             return io_json_fail(&element, DIPOLE_BAD_VALUE, status,
                                 "brings the scene to %zu triangles, expected at most %u", triangle_count,
                                 IO_MESH_TRIANGLE_LIMIT);
-        grow_box(scene, object->mesh);
     }
+    io_scene_pose_objects(scene, 0);
     return true;
 }
 
@@ -359,7 +379,7 @@ void io_scene_destroy(struct io_scene *scene)
     if (!scene)
         return;
     for (size_t i = 0; i < scene->object_count; i++)
-        io_mesh_destroy(scene->objects[i].mesh);
+        io_scene_end_object(&scene->objects[i]);
     free(scene->objects);
     free(scene->lights);
     free(scene->frames.lights);

@@ -2,6 +2,7 @@
 #ifndef IO_SCENE_FILE_H
 #define IO_SCENE_FILE_H
 
+#include "io/deform.h"
 #include "io/material_file.h"
 #include "io/mesh.h"
 
@@ -41,13 +42,37 @@ struct io_frames {
     struct io_light *lights;                 /* of these                     */
 };
 
+struct io_motion; /* as read: scene_motion.h */
+
 struct io_object {
     char name[128];
     struct io_mesh *mesh; /* positions in mm, in the world: transform and unit applied */
     struct io_material material;
     double roughness;  /* GGX roughness of the surface, 0.05 to 1; specular only     */
     bool has_specular; /* false when the object says "specular": false               */
+
+    /* Of an object in motion: mesh is rest in the pose of the frame that is set. NULL and no effect for one
+     * that stands still, whose mesh never changes. */
+    struct io_motion *motion;
+    const struct io_mesh *rest;
+    struct io_pose pose;
 };
+
+/* What the pose of an object is applied to. */
+static inline const struct io_mesh *io_object_rest(const struct io_object *object)
+{
+    return object->rest ? object->rest : object->mesh;
+}
+
+/* What of an object changes from frame to frame; all false where nothing does. */
+struct io_motion_kinds {
+    bool is_deformed, is_moved, is_sequence;
+};
+struct io_motion_kinds io_object_motion_kinds(const struct io_object *object);
+
+/* How much longer the edges of the mesh become, by their root mean square, in the frame that stretches them
+ * most (of some that are looked at); 1 or more. The same in all frames. */
+double io_object_stretch(const struct io_object *object);
 
 struct io_scene {
     char path[4096];
@@ -76,10 +101,10 @@ DIPOLE_CHECKED bool io_scene_read(const char *path, const struct io_scene_option
                                   struct io_scene **scene_out, dipole_status *status);
 
 /*
- * Set the camera and the lights of a scene that was read to those of a frame, 0 to frames.count - 1. Each
- * frame is computed from what was read: frame 0 is the file to the last bit, whatever was set before.
- * Counter-clockwise seen against the axis: the camera turns about its up through its target, the lights
- * about y through the target.
+ * Set the camera, the lights and the objects of a scene that was read to those of a frame, 0 to
+ * frames.count, where what goes round is back where it began. Each frame is computed from what was read:
+ * frame 0 is the file to the last bit, whatever was set before. Counter-clockwise seen against the axis:
+ * the camera turns about its up through its target, the lights about y through the target.
  */
 void io_scene_set_frame(struct io_scene *scene, int frame);
 

@@ -1,4 +1,4 @@
-#include "io/scene_internal.h"
+#include "io/scene_motion.h"
 
 #include <assert.h>
 #include <math.h>
@@ -59,7 +59,7 @@ void io_scene_set_frame(struct io_scene *scene, int frame)
 {
     static const double y[3] = { 0, 1, 0 };
     const struct io_frames *const frames = &scene->frames;
-    assert(frame >= 0 && frame < frames->count);
+    assert(frame >= 0 && frame <= frames->count);
     const double camera_rad = angle_of_frame(frames, frames->camera_turn_deg, frame),
                  lights_rad = angle_of_frame(frames, frames->lights_turn_deg, frame);
     scene->camera = frames->camera;
@@ -77,4 +77,5 @@ void io_scene_set_frame(struct io_scene *scene, int frame)
         else
             turn(scene->lights[i].direction, y, lights_rad);
     }
+    io_scene_pose_objects(scene, frame);
 }

@@ -42,7 +42,8 @@ DIPOLE_CHECKED bool io_scene_read_frames(const struct io_json *at, struct io_sce
                                          dipole_status *status);
 
 struct io_scene_transform {
-    double fit_height; /* 0: as large as the mesh is */
+    double fit_height;     /* 0: as large as the mesh is */
+    double origin[3], fit; /* of io_scene_fit_mesh */
     double scale[3];
     double rotation[3][3];
     double translate[3];
@@ -51,9 +52,21 @@ struct io_scene_transform {
 DIPOLE_CHECKED bool io_scene_read_transform(const struct io_json *at, struct io_scene_transform *transform,
                                             dipole_status *status);
 
-/* Move a mesh to the world; at is its object. */
+/* How far a mesh may reach once it is in the world. */
+#define IO_SCENE_REACH_MAX_MM 1e9
+
+/* Work out what fit_height makes of a mesh, and of all others that are placed alike; at is its object. */
+DIPOLE_CHECKED bool io_scene_fit_mesh(const struct io_json *at, const struct io_mesh *mesh,
+                                      struct io_scene_transform *transform, dipole_status *status);
+
+/* Move a mesh to the world, once the transform was fitted. */
 DIPOLE_CHECKED bool io_scene_place_mesh(const struct io_json *at,
                                         const struct io_scene_transform *transform, double unit_mm,
                                         struct io_mesh *mesh, dipole_status *status);
+
+/* Read the mesh file that a string names. */
+DIPOLE_CHECKED bool io_scene_read_mesh(const struct io_json *at, const char *name,
+                                       const struct io_scene_options *options, struct io_mesh **mesh,
+                                       dipole_status *status);
 
 #endif

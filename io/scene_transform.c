@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-static const double REACH_MAX_MM = 1e9; /* of a mesh, once it is in the world */
-
 /* [x, y, z], or one number for all. A negative factor mirrors; 0 would flatten. */
 static bool get_scale(const struct io_json *at, double out[3], dipole_status *status)
 {
@@ -70,18 +68,12 @@ static void rotate(const struct io_scene_transform *transform, const double v[3]
 /* Move a mesh from its own coordinates to the world's; normals by the inverse transpose. */
 static void apply(const struct io_scene_transform *transform, double unit_mm, struct io_mesh *mesh)
 {
-    double origin[3] = { 0, 0, 0 }, fit = 1;
-    if (transform->fit_height > 0) {
-        fit = transform->fit_height / ((double)mesh->max[1] - (double)mesh->min[1]);
-        for (int axis = 0; axis < 3; axis++)
-            origin[axis] =
-                axis == 1 ? (double)mesh->min[1] : ((double)mesh->min[axis] + (double)mesh->max[axis]) / 2;
-    }
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         float *p = mesh->positions + 3 * i, *n = mesh->normals + 3 * i;
         double position[3], normal[3], turned[3];
         for (int axis = 0; axis < 3; axis++) {
-            position[axis] = ((double)p[axis] - origin[axis]) * fit * transform->scale[axis];
+            position[axis] =
+                ((double)p[axis] - transform->origin[axis]) * transform->fit * transform->scale[axis];
             normal[axis] = (double)n[axis] / transform->scale[axis];
         }
         rotate(transform, position, turned);
@@ -101,23 +93,36 @@ static void apply(const struct io_scene_transform *transform, double unit_mm, st
     io_mesh_update_bounds(mesh);
 }
 
-bool io_scene_place_mesh(const struct io_json *at, const struct io_scene_transform *transform,
-                         double unit_mm, struct io_mesh *mesh, dipole_status *status)
+bool io_scene_fit_mesh(const struct io_json *at, const struct io_mesh *mesh,
+                       struct io_scene_transform *transform, dipole_status *status)
 {
     const struct io_json at_transform = io_json_member(at, "transform");
     const struct io_json fit_height = io_json_member(&at_transform, "fit_height");
-    const double extent = fmax(
-        (double)mesh->max[0] - (double)mesh->min[0],
-        fmax((double)mesh->max[1] - (double)mesh->min[1], (double)mesh->max[2] - (double)mesh->min[2]));
-    if (transform->fit_height > 0 && !((double)mesh->max[1] - (double)mesh->min[1] > 1e-6 * extent))
+    const double height = (double)mesh->max[1] - (double)mesh->min[1];
+    const double extent = fmax((double)mesh->max[0] - (double)mesh->min[0],
+                               fmax(height, (double)mesh->max[2] - (double)mesh->min[2]));
+    transform->fit = 1;
+    if (!(transform->fit_height > 0))
+        return true;
+    if (!(height > 1e-6 * extent))
         return io_json_fail(&fit_height, DIPOLE_BAD_VALUE, status,
                             "is given, but the mesh has no height, expected scale instead");
+    transform->fit = transform->fit_height / height;
+    for (int axis = 0; axis < 3; axis++)
+        transform->origin[axis] =
+            axis == 1 ? (double)mesh->min[1] : ((double)mesh->min[axis] + (double)mesh->max[axis]) / 2;
+    return true;
+}
+
+bool io_scene_place_mesh(const struct io_json *at, const struct io_scene_transform *transform,
+                         double unit_mm, struct io_mesh *mesh, dipole_status *status)
+{
     apply(transform, unit_mm, mesh);
     for (int axis = 0; axis < 3; axis++) {
         const double reach_mm = fmax(fabs((double)mesh->min[axis]), fabs((double)mesh->max[axis]));
-        if (!(reach_mm <= REACH_MAX_MM))
+        if (!(reach_mm <= IO_SCENE_REACH_MAX_MM))
             return io_json_fail(at, DIPOLE_BAD_VALUE, status, "reaches to %g mm, expected at most %g mm",
-                                reach_mm, REACH_MAX_MM);
+                                reach_mm, IO_SCENE_REACH_MAX_MM);
     }
     return true;
 }

@@ -1,9 +1,12 @@
 #include "renderer/effects.h"
 
 const struct render_effect *const render_effects[] = {
+    &render_effect_deform,
+    &render_effect_motion,
     &render_effect_object_ids,
     &render_effect_surface,
     &render_effect_light_view,
+    &render_effect_coherence,
     &render_effect_light_samples,
     &render_effect_environment,
     &render_effect_ambient_visibility,

@@ -4,9 +4,12 @@
 
 #include "renderer/plan.h"
 
+extern const struct render_effect render_effect_deform;
+extern const struct render_effect render_effect_motion;
 extern const struct render_effect render_effect_surface;
 extern const struct render_effect render_effect_object_ids;
 extern const struct render_effect render_effect_light_view;
+extern const struct render_effect render_effect_coherence;
 extern const struct render_effect render_effect_light_samples;
 extern const struct render_effect render_effect_specular;
 extern const struct render_effect render_effect_lambert;

@@ -100,8 +100,16 @@ void render_sky_bind(const struct render_frame *frame)
 bool render_sky_plant(const struct render_frame *frame, dipole_status *status)
 {
     struct render_sky *sky;
-    return render_executor_need_sky(frame, &sky, status) &&
-           (sky->tracer || render_tracer_create(frame->request->scene, &sky->tracer, status));
+    if (!render_executor_need_sky(frame, &sky, status))
+        return false;
+    bool is_stale = !sky->tracer;
+    for (size_t i = 0; i < frame->request->scene->object_count; i++)
+        is_stale |= frame->request->scene->objects[i].motion != NULL;
+    if (!is_stale)
+        return true;
+    render_tracer_destroy(sky->tracer);
+    sky->tracer = NULL;
+    return render_tracer_create(frame->request->scene, &sky->tracer, status);
 }
 
 /* Whether an object gets samples. */

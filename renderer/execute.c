@@ -3,6 +3,7 @@
 #include "renderer/environment_draw.h"
 #include "renderer/gather_draw.h"
 #include "renderer/geometry.h"
+#include "renderer/pose.h"
 #include "renderer/solid.h"
 #include "renderer/splat_draw.h"
 #include "renderer/tsm_draw.h"
@@ -18,6 +19,7 @@ enum {
     PROGRAM_LIMIT = 64,
     TEXTURE_LIMIT = 56,
     DEFINES_SIZE = 256,
+    REST_LOCATION = RENDER_VERTEX_ARRAYS, /* of a vertex's position at rest */
 };
 
 #define PI 3.14159265358979323846
@@ -38,11 +40,13 @@ struct texture {
 
 /* One object's arrays. */
 struct mesh {
+    const struct io_mesh *source; /* at rest, that the geometry has */
     GLuint vertex_array, index_buffer;
     GLsizei index_count;
-    size_t first_vertex, first_triangle; /* counted over all meshes */
-    bool is_solid;                       /* has no triangle that is seen from behind */
-    double roughness;                    /* 0: no gloss */
+    size_t first_triangle;     /* counted over all meshes */
+    struct render_posed posed; /* its vertices, counted over all meshes, too       */
+    bool is_solid;             /* at rest has no triangle that is seen from behind */
+    double roughness;          /* 0: no gloss */
 };
 
 struct render_executor {
@@ -51,6 +55,7 @@ struct render_executor {
     size_t mesh_count;
     struct render_geometry geometry;
     GLuint empty_vertex_array;
+    GLuint pose_program; /* 0 until an object is posed */
     struct program programs[PROGRAM_LIMIT];
     size_t program_count;
     struct texture textures[TEXTURE_LIMIT];
@@ -79,18 +84,25 @@ static double roughness_of(const struct io_object *object)
     return object->has_specular ? object->roughness : 0;
 }
 
+/* Locations 0: position_mm, 1: normal, 2: position at rest. */
+static void bind_vertices(GLuint vertex_array, GLuint location, GLuint buffer, GLintptr offset)
+{
+    glVertexArrayVertexBuffer(vertex_array, location, buffer, offset, 3 * sizeof(float));
+    glVertexArrayAttribFormat(vertex_array, location, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(vertex_array, location, location);
+    glEnableVertexArrayAttrib(vertex_array, location);
+}
+
 static void mesh_create(struct mesh *mesh, const struct io_object *object,
                         const struct render_geometry *geometry)
 {
-    const struct io_mesh *const source = object->mesh;
+    const struct io_mesh *const source = mesh->source;
+    const GLintptr offset = (GLintptr)(mesh->posed.first_vertex * 3 * sizeof(float));
     glCreateVertexArrays(1, &mesh->vertex_array);
-    for (GLuint i = 0; i < RENDER_VERTEX_ARRAYS; i++) { /* locations 0: position_mm, 1: normal */
-        glVertexArrayVertexBuffer(mesh->vertex_array, i, geometry->vertices[i].buffer,
-                                  (GLintptr)(mesh->first_vertex * 3 * sizeof(float)), 3 * sizeof(float));
-        glVertexArrayAttribFormat(mesh->vertex_array, i, 3, GL_FLOAT, GL_FALSE, 0);
-        glVertexArrayAttribBinding(mesh->vertex_array, i, i);
-        glEnableVertexArrayAttrib(mesh->vertex_array, i);
-    }
+    for (GLuint i = 0; i < RENDER_VERTEX_ARRAYS; i++)
+        bind_vertices(mesh->vertex_array, i, geometry->vertices[i].buffer, offset);
+    bind_vertices(mesh->vertex_array, REST_LOCATION, geometry->vertices[RENDER_VERTEX_POSITION].buffer,
+                  offset);
     glCreateBuffers(1, &mesh->index_buffer);
     glNamedBufferStorage(mesh->index_buffer, (GLsizeiptr)(source->triangle_count * 3 * sizeof(uint32_t)),
                          source->indices, 0);
@@ -99,22 +111,70 @@ static void mesh_create(struct mesh *mesh, const struct io_object *object,
     mesh->roughness = roughness_of(object);
 }
 
+static void mesh_end(struct mesh *mesh)
+{
+    glDeleteVertexArrays(1, &mesh->vertex_array);
+    glDeleteBuffers(1, &mesh->index_buffer);
+    render_pose_end(&mesh->posed);
+}
+
+/* Take all meshes to the context as they are at rest. What became of a mesh that is there is known. */
 static bool meshes_create(struct render_executor *executor, const struct io_scene *scene,
                           dipole_status *status)
 {
     size_t vertex_count = 0, triangle_count = 0;
+    for (size_t i = 0; i < executor->mesh_count; i++)
+        mesh_end(&executor->meshes[i]);
+    render_geometry_destroy(&executor->geometry);
     bool done = render_geometry_create(scene, &executor->geometry, status);
     for (size_t i = 0; done && i < scene->object_count; i++) {
         struct mesh *const mesh = &executor->meshes[i];
-        const struct io_mesh *const source = scene->objects[i].mesh;
-        mesh->first_vertex = vertex_count;
+        const struct io_mesh *const source = io_object_rest(&scene->objects[i]);
+        const bool is_known = mesh->source == source;
+        mesh->source = source;
+        mesh->posed.first_vertex = vertex_count;
+        mesh->posed.vertex_count = source->vertex_count;
         mesh->first_triangle = triangle_count;
         mesh_create(mesh, &scene->objects[i], &executor->geometry);
-        done = render_mesh_is_solid(source, &mesh->is_solid, status);
+        done = is_known || render_mesh_is_solid(source, &mesh->is_solid, status);
         vertex_count += source->vertex_count;
         triangle_count += source->triangle_count;
     }
     return done;
+}
+
+/* Meshes that took another's place, which may be of another size, are taken to the context; objects that
+ * rest in this frame are put back. */
+static bool update_meshes(struct render_executor *executor, const struct io_scene *scene,
+                          dipole_status *status)
+{
+    bool is_known = true;
+    for (size_t i = 0; i < executor->mesh_count; i++)
+        is_known &= executor->meshes[i].source == io_object_rest(&scene->objects[i]);
+    if (!is_known && !meshes_create(executor, scene, status))
+        return false;
+    for (size_t i = 0; i < executor->mesh_count; i++) {
+        if (io_pose_is_rest(&scene->objects[i].pose))
+            render_pose_undo(&executor->geometry, &executor->meshes[i].posed);
+    }
+    return true;
+}
+
+bool render_executor_pose(const struct render_frame *frame, bool is_deformed, dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    for (size_t i = 0; i < executor->mesh_count; i++) {
+        const struct io_object *const object = &frame->request->scene->objects[i];
+        struct mesh *const mesh = &executor->meshes[i];
+        if (io_pose_is_rest(&object->pose) || (object->pose.deform_count > 0) != is_deformed)
+            continue;
+        if (!executor->pose_program && !render_pose_program_create(&executor->pose_program, status))
+            return false;
+        render_pose_write(executor->pose_program, object, &executor->geometry, &mesh->posed);
+        bind_vertices(mesh->vertex_array, REST_LOCATION, mesh->posed.rest[RENDER_VERTEX_POSITION], 0);
+        render_count_draw(frame);
+    }
+    return true;
 }
 
 /* A texture that a pass keeps by itself is not ours to delete. */
@@ -153,11 +213,10 @@ void render_executor_destroy(struct render_executor *executor)
 {
     if (!executor)
         return;
-    for (size_t i = 0; i < executor->mesh_count; i++) {
-        glDeleteVertexArrays(1, &executor->meshes[i].vertex_array);
-        glDeleteBuffers(1, &executor->meshes[i].index_buffer);
-    }
+    for (size_t i = 0; i < executor->mesh_count; i++)
+        mesh_end(&executor->meshes[i]);
     render_geometry_destroy(&executor->geometry);
+    glDeleteProgram(executor->pose_program);
     for (size_t i = 0; i < executor->program_count; i++)
         glDeleteProgram(executor->programs[i].handle);
     for (size_t i = 0; i < executor->texture_count; i++)
@@ -504,7 +563,7 @@ void render_set_points(const struct render_frame *frame)
 
 size_t render_executor_program_count(const struct render_executor *executor)
 {
-    return executor->program_count;
+    return executor->program_count + (executor->pose_program != 0);
 }
 
 size_t render_executor_draw_count(const struct render_executor *executor, size_t effect)
@@ -613,7 +672,7 @@ void render_draw_object(const struct render_frame *frame, size_t object)
     const struct render_plan *const plan = frame->plan;
     const struct render_medium *const medium = &plan->media->media[plan->objects[object].medium];
     render_set_float(frame->program, "object", (double)(object + 1));
-    render_set_int(frame->program, "first_vertex", (int)mesh->first_vertex);
+    render_set_int(frame->program, "first_vertex", (int)mesh->posed.first_vertex);
     render_set_int(frame->program, "first_triangle", (int)mesh->first_triangle);
     render_set_float(frame->program, "object_eta", medium->eta);
     glBindVertexArray(mesh->vertex_array);
@@ -656,7 +715,9 @@ static bool draw(const struct render_frame *frame, const struct render_pass *pas
         return true;
     }
     for (size_t i = 0; i < frame->executor->mesh_count; i++) {
-        const bool is_inside_hidden = frame->executor->meshes[i].is_solid && is_seen_from_outside(frame, i);
+        const bool is_inside_hidden = frame->executor->meshes[i].is_solid &&
+                                      render_pose_keeps_sides(&frame->request->scene->objects[i]) &&
+                                      is_seen_from_outside(frame, i);
         (is_inside_hidden ? glEnable : glDisable)(GL_CULL_FACE);
         render_draw_object(frame, i);
     }
@@ -708,6 +769,8 @@ bool render_executor_run(struct render_executor *executor, const struct render_r
 {
     memset(time_ms, 0, RENDER_EFFECT_LIMIT * sizeof *time_ms);
     memset(executor->draw_counts, 0, sizeof executor->draw_counts);
+    if (!update_meshes(executor, request->scene, status))
+        return false;
     if (executor->splatter)
         render_splatter_begin(executor->splatter);
     if (!prepare_textures(executor, plan, status))

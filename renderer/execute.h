@@ -103,6 +103,11 @@ DIPOLE_CHECKED bool render_executor_need_sky(const struct render_frame *frame, s
 struct render_tsm *render_executor_tsm(const struct render_executor *executor);
 struct render_sky *render_executor_sky(const struct render_executor *executor);
 
+/* Put the vertices of objects that are not at rest where the frame has them: those that are deformed, or
+ * those that are moved alone. */
+DIPOLE_CHECKED bool render_executor_pose(const struct render_frame *frame, bool is_deformed,
+                                         dipole_status *status);
+
 /* The triangles of all objects, for common/points.glsl; handed on as mesh_triangles and so on. */
 DIPOLE_CHECKED bool render_executor_use_meshes(const struct render_frame *frame, dipole_status *status);
 

@@ -18,7 +18,7 @@ static void copy_triangles(const struct io_scene *scene, uint32_t (*texels)[4])
 {
     size_t first_vertex = 0;
     for (size_t i = 0; i < scene->object_count; i++) {
-        const struct io_mesh *const mesh = scene->objects[i].mesh;
+        const struct io_mesh *const mesh = io_object_rest(&scene->objects[i]);
         for (size_t t = 0; t < mesh->triangle_count; t++, texels++) {
             for (size_t k = 0; k < 3; k++)
                 (*texels)[k] = (uint32_t)first_vertex + mesh->indices[3 * t + k];
@@ -31,7 +31,7 @@ static void copy_triangles(const struct io_scene *scene, uint32_t (*texels)[4])
 static void copy_vertices(const struct io_scene *scene, int array, float *values)
 {
     for (size_t i = 0; i < scene->object_count; i++) {
-        const struct io_mesh *const mesh = scene->objects[i].mesh;
+        const struct io_mesh *const mesh = io_object_rest(&scene->objects[i]);
         const float *const source = array == RENDER_VERTEX_POSITION ? mesh->positions : mesh->normals;
         memcpy(values, source, 3 * mesh->vertex_count * sizeof *values);
         values += 3 * mesh->vertex_count;
@@ -44,8 +44,9 @@ bool render_geometry_create(const struct io_scene *scene, struct render_geometry
     size_t vertex_count = 0, triangle_count = 0;
     *geometry = (struct render_geometry){ 0 };
     for (size_t i = 0; i < scene->object_count; i++) {
-        vertex_count += scene->objects[i].mesh->vertex_count;
-        triangle_count += scene->objects[i].mesh->triangle_count;
+        const struct io_mesh *const mesh = io_object_rest(&scene->objects[i]);
+        vertex_count += mesh->vertex_count;
+        triangle_count += mesh->triangle_count;
     }
     if (!check_size(vertex_count, triangle_count, status))
         return false;

@@ -14,8 +14,8 @@ struct render_geometry {
 };
 
 /*
- * Take the meshes to the current context. Fails with DIPOLE_NOT_SUPPORTED (more vertices or triangles than
- * its buffers have texels) or DIPOLE_OUT_OF_MEMORY; *geometry is then empty.
+ * Take the meshes, as they are at rest, to the current context. Fails with DIPOLE_NOT_SUPPORTED (more
+ * vertices or triangles than its buffers have texels) or DIPOLE_OUT_OF_MEMORY; *geometry is then empty.
  */
 DIPOLE_CHECKED bool render_geometry_create(const struct io_scene *scene, struct render_geometry *geometry,
                                            dipole_status *status);

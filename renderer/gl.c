@@ -175,32 +175,47 @@ static void detach_shaders(GLuint program)
         glDetachShader(program, shaders[i]);
 }
 
+/* Link what was compiled; what fails, now or before, is deleted. */
+static bool finish(GLuint program, bool is_compiled, const char *names, GLuint *program_out,
+                   dipole_status *status)
+{
+    GLint is_linked = GL_FALSE;
+    if (is_compiled) {
+        glLinkProgram(program);
+        glGetProgramiv(program, GL_LINK_STATUS, &is_linked);
+    }
+    *program_out = is_linked ? program : 0;
+    if (is_linked) {
+        detach_shaders(program);
+        return true;
+    }
+    if (is_compiled) {
+        char log[256] = "";
+        glGetProgramInfoLog(program, sizeof log, NULL, log);
+        dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL, "%s: %.*s", names, (int)strcspn(log, "\n"), log);
+    }
+    glDeleteProgram(program);
+    return false;
+}
+
 bool render_program_create(const struct render_shader *vertex, const struct render_shader *fragment,
                            const char *defines, GLuint *program_out, dipole_status *status)
 {
     const GLuint program = glCreateProgram();
-    *program_out = 0;
-    bool done = compile(vertex, defines, GL_VERTEX_SHADER, program, status) &&
-                compile(fragment, defines, GL_FRAGMENT_SHADER, program, status);
-    if (done) {
-        GLint is_linked = GL_FALSE;
-        glLinkProgram(program);
-        glGetProgramiv(program, GL_LINK_STATUS, &is_linked);
-        done = is_linked;
-        if (!done) {
-            char log[256] = "";
-            glGetProgramInfoLog(program, sizeof log, NULL, log);
-            dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL, "%s with %s: %.*s", vertex->name,
-                        fragment->name, (int)strcspn(log, "\n"), log);
-        }
-    }
-    if (done) {
-        *program_out = program;
-        detach_shaders(program);
-    } else {
-        glDeleteProgram(program);
-    }
-    return done;
+    char names[160];
+    snprintf(names, sizeof names, "%s with %s", vertex->name, fragment->name);
+    const bool is_compiled = compile(vertex, defines, GL_VERTEX_SHADER, program, status) &&
+                             compile(fragment, defines, GL_FRAGMENT_SHADER, program, status);
+    return finish(program, is_compiled, names, program_out, status);
+}
+
+bool render_feedback_program_create(const struct render_shader *vertex, const char *const *outputs,
+                                    int output_count, GLuint *program_out, dipole_status *status)
+{
+    const GLuint program = glCreateProgram();
+    const bool is_compiled = compile(vertex, NULL, GL_VERTEX_SHADER, program, status);
+    glTransformFeedbackVaryings(program, output_count, outputs, GL_SEPARATE_ATTRIBS);
+    return finish(program, is_compiled, vertex->name, program_out, status);
 }
 
 /* ---- uniforms ----------------------------------------------------------------------------------- */

@@ -39,6 +39,11 @@ DIPOLE_CHECKED bool render_program_create(const struct render_shader *vertex,
                                           const struct render_shader *fragment, const char *defines,
                                           GLuint *program_out, dipole_status *status);
 
+/* The same of a vertex shader whose outputs are written to buffers, one for each. */
+DIPOLE_CHECKED bool render_feedback_program_create(const struct render_shader *vertex,
+                                                   const char *const *outputs, int output_count,
+                                                   GLuint *program_out, dipole_status *status);
+
 /* A buffer that shaders read as a texture. */
 struct render_buffer_texture {
     GLuint buffer, texture;

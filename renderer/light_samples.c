@@ -142,11 +142,13 @@ static bool append_block(const struct reducer *reducer, struct block block, doub
     }
     if (!(share > 0))
         return true;
+    const double factor = view->flux_factor > 0 ? view->flux_factor : 1;
     struct render_light_sample sample = { .footprint_mm = (float)extent_mm,
                                           .object = (float)reducer->object };
     for (int k = 0; k < 3; k++) {
         sample.position_mm[k] = (float)(moment[k] / share);
-        sample.flux_w[k] = (float)((view->irradiance ? irradiance / lit_count : share) * view->rgb[k]);
+        sample.flux_w[k] =
+            (float)((view->irradiance ? irradiance / lit_count : share) * factor * view->rgb[k]);
     }
     return render_light_samples_add(reducer->targets[reducer->object].samples, &sample, reducer->status);
 }
@@ -209,11 +211,16 @@ static bool reduce_quadrant(struct reducer *reducer, int x, int y, int size)
     const int size_px = reducer->view->size_px;
     if (x >= size_px || y >= size_px)
         return true;
-    if (size <= 1 << reducer->view->levels)
-        return reduce_objects(reducer, (struct block){ .x = x,
-                                                       .y = y,
-                                                       .width = size < size_px - x ? size : size_px - x,
-                                                       .height = size < size_px - y ? size : size_px - y });
+    if (x + size <= 0 || y + size <= 0)
+        return true;
+    if (size <= 1 << reducer->view->levels) {
+        const int left = x > 0 ? x : 0, bottom = y > 0 ? y : 0;
+        const int right = x + size < size_px ? x + size : size_px;
+        const int top = y + size < size_px ? y + size : size_px;
+        return reduce_objects(
+            reducer,
+            (struct block){ .x = left, .y = bottom, .width = right - left, .height = top - bottom });
+    }
     const int half = size / 2;
     return reduce_quadrant(reducer, x, y, half) && reduce_quadrant(reducer, x + half, y, half) &&
            reduce_quadrant(reducer, x, y + half, half) &&
@@ -235,7 +242,7 @@ struct part {
 
 struct parts {
     const struct render_light_view *view;
-    int size; /* of the whole quadtree */
+    int start, size; /* of the whole quadtree, along both sides */
     struct part at[PART_COUNT];
 };
 
@@ -254,8 +261,8 @@ static void reduce_part(void *context, int index)
     struct part *const part = &parts->at[index];
     struct reducer reducer = { .targets = part->targets, .view = parts->view, .status = &part->status };
     const int size = parts->size >> PART_LEVELS;
-    part->is_done =
-        reduce_quadrant(&reducer, every_other_bit(index) * size, every_other_bit(index >> 1) * size, size);
+    part->is_done = reduce_quadrant(&reducer, parts->start + every_other_bit(index) * size,
+                                    parts->start + every_other_bit(index >> 1) * size, size);
 }
 
 static bool append_all(struct render_light_samples *samples, const struct render_light_samples *more,
@@ -343,10 +350,11 @@ bool render_light_samples_append(const struct render_light_target *targets,
                                  const struct render_light_view *view, dipole_status *status)
 {
     const size_t target_count = count_targets(view);
-    struct parts parts = { .view = view, .size = 1 };
+    const int shift = view->is_shifted ? 1 << view->levels >> 1 : 0;
+    struct parts parts = { .view = view, .start = -shift, .size = 1 };
     size_t *const numbers = calloc(target_count, sizeof *numbers);
     struct render_light_samples **const lists = calloc(target_count, sizeof(struct render_light_samples *));
-    while (parts.size < view->size_px || parts.size < 1 << (view->levels + PART_LEVELS))
+    while (parts.size < view->size_px + shift || parts.size < 1 << (view->levels + PART_LEVELS))
         parts.size *= 2;
     size_t list_count = 0;
     if (numbers && lists)
@@ -369,32 +377,12 @@ bool render_light_samples_append(const struct render_light_target *targets,
 
 /* ---- merging ------------------------------------------------------------------------------------ */
 
-/* A sample's object, and its cube as its place on the Z-order curve. */
-struct key {
-    uint64_t code;
-    size_t index;
-    float object;
-};
-
-/* Put two zeros between the low 21 bits. */
-static uint64_t spread_bits(uint64_t x)
-{
-    x &= 0x1fffff;
-    x = (x | x << 32) & 0x001f00000000ffff;
-    x = (x | x << 16) & 0x001f0000ff0000ff;
-    x = (x | x << 8) & 0x100f00f00f00f00f;
-    x = (x | x << 4) & 0x10c30c30c30c30c3;
-    return (x | x << 2) & 0x1249249249249249;
-}
-
 uint64_t render_cube_code(const double position_mm[3], const double min_mm[3], double cell_mm)
 {
-    uint64_t code = 0;
-    for (int k = 0; k < 3; k++) {
-        const double cell = floor((position_mm[k] - min_mm[k]) / cell_mm);
-        code |= spread_bits((uint64_t)fmin(fmax(cell, 0), 0x1fffff)) << k;
-    }
-    return code;
+    double cell[3];
+    for (int k = 0; k < 3; k++)
+        cell[k] = floor((position_mm[k] - min_mm[k]) / cell_mm);
+    return render_z_order(cell);
 }
 
 static uint64_t cube_code(const struct render_light_sample *sample, const double min_mm[3], double cell_mm)
@@ -407,13 +395,14 @@ static uint64_t cube_code(const struct render_light_sample *sample, const double
 /* By object, then code; equal ones stay in their order. Digits in which all keys are alike are left out. */
 enum { DIGIT_BITS = 11, DIGIT_COUNT = 1 << DIGIT_BITS };
 
-static size_t digit_of(const struct key *key, int shift)
+static size_t digit_of(const struct render_z_key *key, int shift)
 {
     return (size_t)((shift < 64 ? key->code : (uint64_t)key->object) >> shift % 64) & (DIGIT_COUNT - 1);
 }
 
 /* Sort by one digit; false: there is nothing to do. */
-static bool sort_digit(const struct key *keys, size_t count, int shift, struct key *sorted)
+static bool sort_digit(const struct render_z_key *keys, size_t count, int shift,
+                       struct render_z_key *sorted)
 {
     size_t starts[DIGIT_COUNT] = { 0 };
     for (size_t i = 0; i < count; i++)
@@ -431,14 +420,14 @@ static bool sort_digit(const struct key *keys, size_t count, int shift, struct k
     return true;
 }
 
-/* Both hold count keys; returns the one that is sorted. */
-static struct key *sort_keys(struct key *keys, struct key *spare, size_t count)
+struct render_z_key *render_light_samples_sort_keys(struct render_z_key *keys, struct render_z_key *spare,
+                                                    size_t count)
 {
     static const int shifts[] = { 0, 11, 22, 33, 44, 55, 64, 75, 86 };
     for (size_t s = 0; s < sizeof shifts / sizeof *shifts; s++) {
         if (!sort_digit(keys, count, shifts[s], spare))
             continue;
-        struct key *const sorted = spare;
+        struct render_z_key *const sorted = spare;
         spare = keys;
         keys = sorted;
     }
@@ -451,8 +440,8 @@ static double weight_of(const struct render_light_sample *sample)
     return (double)sample->flux_w[0] + (double)sample->flux_w[1] + (double)sample->flux_w[2];
 }
 
-static struct render_light_sample merge_run(const struct render_light_samples *samples,
-                                            const struct key *keys, size_t count)
+struct render_light_sample render_light_samples_merge_run(const struct render_light_samples *samples,
+                                                          const struct render_z_key *keys, size_t count)
 {
     double flux_w[3] = { 0, 0, 0 }, moment[3] = { 0, 0, 0 }, weight_sum = 0, diagonal2 = 0;
     float min[3], max[3], footprint_mm = 0;
@@ -486,7 +475,7 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
     const size_t count = samples->count;
     if (count == 0)
         return true;
-    struct key *const unsorted =
+    struct render_z_key *const unsorted =
         count > SIZE_MAX / 2 / sizeof *unsorted ? NULL : malloc(2 * count * sizeof *unsorted);
     if (!unsorted)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to merge %zu light samples",
@@ -497,16 +486,18 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
             min_mm[k] = fmin(min_mm[k], (double)samples->samples[i].position_mm[k]);
     }
     for (size_t i = 0; i < count; i++)
-        unsorted[i] = (struct key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm),
-                                    .index = i,
-                                    .object = samples->samples[i].object };
-    const struct key *const keys = sort_keys(unsorted, unsorted + count, count);
+        unsorted[i] = (struct render_z_key){ .code = cube_code(&samples->samples[i], min_mm, cell_mm),
+                                             .index = i,
+                                             .object = samples->samples[i].object };
+    const struct render_z_key *const keys =
+        render_light_samples_sort_keys(unsorted, unsorted + count, count);
     bool done = true;
     for (size_t first = 0, end; done && first < count; first = end) {
         end = first + 1;
         while (end < count && keys[end].code == keys[first].code && keys[end].object == keys[first].object)
             end++;
-        const struct render_light_sample sample = merge_run(samples, keys + first, end - first);
+        const struct render_light_sample sample =
+            render_light_samples_merge_run(samples, keys + first, end - first);
         done = render_light_samples_add(merged, &sample, status);
     }
     free(unsorted);
@@ -516,5 +507,6 @@ bool render_light_samples_merge(const struct render_light_samples *samples, doub
 void render_light_samples_destroy(struct render_light_samples *samples)
 {
     free(samples->samples);
+    free(samples->codes);
     *samples = (struct render_light_samples){ 0 };
 }

@@ -6,6 +6,7 @@
 #define RENDERER_LIGHT_SAMPLES_H
 
 #include "libdipole/dipole.h"
+#include "renderer/z_order.h"
 
 #include <stdint.h>
 
@@ -20,6 +21,8 @@ struct render_light_sample {
 struct render_light_samples {
     struct render_light_sample *samples;
     size_t count, capacity;
+    uint64_t *codes; /* of the cubes of cell_samples.h; NULL, or old, for others */
+    size_t code_capacity;
 };
 
 /* One picture from a light: size_px x size_px texels of { x, y, z in mm, power share }, where
@@ -32,13 +35,18 @@ struct render_light_view {
     int size_px;
     double forward[3]; /* unit vector, the view's depth axis */
     double rgb[3];
-    int levels; /* texels are merged in blocks of 2^levels at most         */
+    int levels;           /* texels are merged in blocks of 2^levels at most         */
+    const float *rest_mm; /* of each texel, of four floats: its surface at rest; for cell_samples.h      */
+    double flux_factor;   /* 0: 1. Samples carry so much of the flux                               */
+    bool is_shifted;      /* blocks begin half of one before the view does                              */
 };
 
 /* Where the samples of an object go, and how far apart they may be. NULL: it gets none. */
 struct render_light_target {
     struct render_light_samples *samples;
     double spacing_mm;
+    double cell_mm,
+        origin_mm[3]; /* of cell_samples.h: side of a cube, and a corner of the object at rest */
 };
 
 /*
@@ -60,11 +68,19 @@ DIPOLE_CHECKED bool render_light_samples_append(const struct render_light_target
 DIPOLE_CHECKED bool render_light_samples_merge(const struct render_light_samples *samples, double cell_mm,
                                                struct render_light_samples *merged, dipole_status *status);
 
+/* What merging shares with cell_samples.c: the sample that the keys' samples are together, and sorting. */
+struct render_light_sample render_light_samples_merge_run(const struct render_light_samples *samples,
+                                                          const struct render_z_key *keys, size_t count);
+
 /* Append one sample. Fails with DIPOLE_OUT_OF_MEMORY. */
 DIPOLE_CHECKED bool render_light_samples_add(struct render_light_samples *samples,
                                              const struct render_light_sample *sample,
                                              dipole_status *status);
 
+/* By object, then code; equal ones stay in their order. Both hold count keys; returns the one that is
+ * sorted. */
+struct render_z_key *render_light_samples_sort_keys(struct render_z_key *keys, struct render_z_key *spare,
+                                                    size_t count);
 /* The cube of side cell_mm that a position is in, as its place on a space-filling curve; 2^21 to a side. */
 uint64_t render_cube_code(const double position_mm[3], const double min_mm[3], double cell_mm);
 

@@ -18,7 +18,7 @@ struct options {
     struct cli_texts allowed_paths;
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
-    int technique, context, area;
+    int technique, context, area, coherence;
     int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int environment_samples;
     double ambient_visibility; /* rays */
@@ -296,6 +296,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                        .reading = &reading,
                        .drawing = { .technique = (enum render_technique)options->technique,
                                     .area = (enum render_area)options->area,
+                                    .coherence = (enum render_coherence)options->coherence,
                                     .epsilon = options->epsilon,
                                     .environment_samples =
                                         (enum render_environment_samples)options->environment_samples,
@@ -337,6 +338,8 @@ static bool check_usage(const struct options *options, dipole_status *status)
         { is_reference && options->context >= 0, "--technique reference cannot be used with --context" },
         { options->area != RENDER_AREA_FLUX && !is_splat && !options->is_viewed,
           "--splat-area is of --technique splat alone" },
+        { options->coherence != RENDER_COHERENCE_AUTO && !has_samples && !options->is_viewed,
+          "--coherence is of --technique gather and splat alone" },
         { options->environment_samples && !has_samples && !options->is_viewed,
           "--environment-samples is of --technique gather and splat alone" },
         { options->ambient_visibility != floor(options->ambient_visibility),
@@ -479,6 +482,15 @@ int main(int argc, char **argv)
                   "pictures: name.png becomes name.0000.png and so on. Default: frame 0, not numbered.",
           .min = 0,
           .max = 99999 },
+        { .name = "coherence",
+          .kind = CLI_CHOICE,
+          .target = &options.coherence,
+          .argument = "KIND",
+          .help =
+              "How light samples are kept from flickering in a scene in motion: none; two-pass, each "
+              "light's view sampled twice; surface, samples stay on the surface. Default auto: surface, "
+              "where light or objects move.",
+          .choices = render_coherence_names },
         { .name = "context",
           .kind = CLI_CHOICE,
           .target = &options.context,

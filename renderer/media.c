@@ -85,6 +85,15 @@ bool render_media_create(const struct io_scene *scene, struct render_media **med
     return done;
 }
 
+void render_media_measure(const struct io_scene *scene, struct render_media *media)
+{
+    for (size_t i = 0; i < scene->object_count; i++) {
+        const struct io_motion_kinds kinds = io_object_motion_kinds(&scene->objects[i]);
+        if (kinds.is_deformed || kinds.is_sequence)
+            media->area_mm2[i] = surface_area_mm2(scene->objects[i].mesh);
+    }
+}
+
 void render_media_destroy(struct render_media *media)
 {
     if (!media)

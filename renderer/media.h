@@ -15,7 +15,7 @@ struct render_medium {
     bool has_scattering;                          /* in some channel                         */
 };
 
-/* End it with render_media_destroy; the scene must outlive it. Immutable: any number of threads may read
+/* End it with render_media_destroy; the scene must outlive it. Any number of threads may read
  * it. */
 struct render_media {
     struct render_medium *media;
@@ -36,6 +36,9 @@ struct render_table {
 DIPOLE_CHECKED bool render_media_create(const struct io_scene *scene, struct render_media **media_out,
                                         dipole_status *status);
 void render_media_destroy(struct render_media *media);
+
+/* Measure anew the areas of objects that are deformed or change their mesh, once a frame is set. */
+void render_media_measure(const struct io_scene *scene, struct render_media *media);
 
 /* How far all but epsilon of what leaves a medium travels, the farthest channel; and how far apart light
  * samples alias by at most epsilon, the narrowest. 0 and INFINITY where nothing scatters. theory.md T9,

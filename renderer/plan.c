@@ -218,6 +218,7 @@ static bool read_scene(const struct render_request *request, struct render_plan 
     for (size_t i = 0; i < scene->light_count; i++)
         plan->lit_count += render_light_shines(&scene->lights[i]);
     look_at_objects(request, plan);
+    render_plan_look_at_motion(request, plan);
     return true;
 }
 
@@ -307,6 +308,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_spend_epsilon(request, plan);
         tell_objects_apart(request, plan);
         choose_technique(request, plan);
+        render_plan_choose_cells(request, plan);
         done = render_plan_light_from_around(request, plan, status) &&
                render_plan_make_views(request, plan, status) &&
                render_plan_make_maps(request, plan, status);

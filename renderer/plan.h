@@ -26,6 +26,7 @@ struct render_request {
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
     enum render_area area;
+    enum render_coherence coherence;
     bool is_captured; /* no scattering; what it would need is kept instead */
     bool is_tone_mapped;
 };
@@ -37,7 +38,7 @@ enum render_draw_kind {
     RENDER_DRAW_NOTHING,    /* the pass's run function needs no targets        */
 };
 
-enum { RENDER_PASS_READS = 10, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 2, RENDER_PASS_TARGETS = 6 };
+enum { RENDER_PASS_READS = 10, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 3, RENDER_PASS_TARGETS = 7 };
 
 /* One row of an effect. Names of textures are those of the table in plan.c. */
 struct render_pass {
@@ -133,6 +134,7 @@ struct render_plan_object {
     double lit_area_mm2; /* of its surface that may face a light, light by light                     */
     double pixel_count;  /* that it may cover, as a ball would                                       */
     double spacing_mm;   /* of its finest light samples                                              */
+    double cell_mm;      /* of cubes that samples are gathered in; 0: they follow the light's view   */
 };
 
 /* What becomes of the visible objects of one medium. All 0 where there are none. */
@@ -153,6 +155,8 @@ struct render_plan_medium {
 struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
     enum render_area area;
+    enum render_coherence coherence; /* never AUTO; NONE where no light samples move */
+    size_t deformed_vertex_count, moved_vertex_count;
     double epsilon;
     const struct render_media *media;
     struct render_media *own_media; /* when the request brought none                    */

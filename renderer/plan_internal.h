@@ -24,6 +24,10 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
 void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan);
 void render_plan_predict_error(const struct render_request *request, struct render_plan *plan);
 
+/* plan_motion.c: before epsilon is spent; and once spacings and the technique are known. */
+void render_plan_look_at_motion(const struct render_request *request, struct render_plan *plan);
+void render_plan_choose_cells(const struct render_request *request, struct render_plan *plan);
+
 /* plan_views.c */
 DIPOLE_CHECKED bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,
                                            dipole_status *status);

@@ -24,13 +24,15 @@ static const struct render_texture textures[] = {
     { .name = "light_view", .size = RENDER_SIZE_LIGHT_VIEW, .is_far_where_empty = true },
     { .name = "light_object", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW },     /* object + 1  */
     { .name = "light_irradiance", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW }, /* per rgb */
+    { .name = "light_rest", .size = RENDER_SIZE_LIGHT_VIEW }, /* the surface at rest, mm */
     { .name = "light_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_LIGHT_VIEW },
     { .name = "light_samples", .format = RENDER_OTHER },
-    { .name = "tsm_volume", .format = RENDER_OTHER },  /* of the map's medium                        */
-    { .name = "tsm_pattern", .format = RENDER_OTHER }, /* the places of its samples                  */
-    { .name = "tsm_form", .format = RENDER_OTHER },    /* of the local response: R by distance, cosine */
-    { .name = "tsm_kernel", .format = RENDER_OTHER },  /* its cells                                  */
-    { .name = "tsm_sources", .format = RENDER_OTHER }, /* of its medium, instead of the volume       */
+    { .name = "posed_vertices", .format = RENDER_OTHER }, /* stands for the objects' vertices */
+    { .name = "tsm_volume", .format = RENDER_OTHER },     /* of the map's medium                        */
+    { .name = "tsm_pattern", .format = RENDER_OTHER },    /* the places of its samples                  */
+    { .name = "tsm_form", .format = RENDER_OTHER },       /* of the local response: R by distance, cosine */
+    { .name = "tsm_kernel", .format = RENDER_OTHER },     /* its cells                                  */
+    { .name = "tsm_sources", .format = RENDER_OTHER },    /* of its medium, instead of the volume       */
     { .name = "tsm_factors", .format = RENDER_OTHER },
     { .name = "tsm_position_mm", .size = RENDER_SIZE_MAP, .is_mipmapped = true }, /* times w = coverage */
     { .name = "tsm_normal", .size = RENDER_SIZE_MAP, .is_mipmapped = true },      /* times coverage  */
@@ -81,6 +83,8 @@ bool render_plan_wants(const struct render_plan *plan, const char *texture)
 {
     if (strcmp(texture, "light_object") == 0)
         return plan->has_object_ids;
+    if (strcmp(texture, "light_rest") == 0)
+        return plan->coherence == RENDER_COHERENCE_SURFACE;
     assert(strcmp(texture, "light_irradiance") == 0);
     return plan->area == RENDER_AREA_OVERLAP;
 }

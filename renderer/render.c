@@ -125,6 +125,7 @@ bool render_run(struct renderer *renderer, const struct render_request *request_
     request.environment = renderer->environment;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
+    render_media_measure(renderer->scene, renderer->media);
     const bool done =
         render_plan_check_request(request.scene, request.epsilon, status) &&
         add_volumes(renderer, &request, status) && render_plan_create(&request, &plan, status) &&
@@ -206,6 +207,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .scene = renderer->scene,
         .technique = options->technique,
         .area = options->area,
+        .coherence = options->coherence,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
         .media = renderer->media,
         .tables = options->tables,

@@ -35,6 +35,16 @@ extern const char *const render_technique_names[];
 enum render_area { RENDER_AREA_FLUX = 0, RENDER_AREA_OVERLAP };
 extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 
+/* How light samples are kept from flickering over frames in which light or objects move: not at all; each
+ * light's view sampled twice, half a block apart; or samples that stay on the surface. The default is the
+ * last, where there is more than one frame. */
+enum render_coherence {
+    RENDER_COHERENCE_AUTO = 0,
+    RENDER_COHERENCE_NONE,
+    RENDER_COHERENCE_TWO_PASS,
+    RENDER_COHERENCE_SURFACE,
+};
+extern const char *const render_coherence_names[]; /* "auto", "none", "two-pass", "surface", NULL */
 /* Where light from all around is sampled: on the triangles; or as in the paper, on layers peeled along y;
  * or along all three axes. */
 enum render_environment_samples {
@@ -68,9 +78,9 @@ struct renderer;
 
 /*
  * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
- * and lights may change between calls, what its objects are made of only as render_renew_materials says,
- * its environment may not. Fails as render_environment_read does, with DIPOLE_NOT_SUPPORTED (no context:
- * says which were tried and why each failed) or DIPOLE_OUT_OF_MEMORY.
+ * and lights may change between calls, its objects by io_scene_set_frame alone, what they are made of only
+ * as render_renew_materials says, its environment may not. Fails as render_environment_read does, with
+ * DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed) or DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                                   struct renderer **renderer_out, dipole_status *status);
@@ -126,6 +136,7 @@ struct render_options {
     enum render_technique technique;
     double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
     enum render_area area;
+    enum render_coherence coherence;
     const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
     struct render_tsm_options tsm;

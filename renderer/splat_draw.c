@@ -1,5 +1,6 @@
 #include "renderer/splat_draw.h"
 
+#include "renderer/cell_samples.h"
 #include "renderer/splats.h"
 
 #include <math.h>
@@ -120,6 +121,33 @@ static float *read_view(const struct render_frame *frame, const char *texture, G
     return texels;
 }
 
+static struct render_light_target target_of(const struct render_frame *frame, size_t index,
+                                            struct render_light_samples *samples)
+{
+    const struct render_plan_object *const object = &frame->plan->objects[index];
+    const struct io_mesh *const rest = io_object_rest(&frame->request->scene->objects[index]);
+    struct render_light_target target = { .samples = samples,
+                                          .spacing_mm = object->spacing_mm,
+                                          .cell_mm = object->cell_mm };
+    for (int k = 0; k < 3; k++)
+        target.origin_mm[k] = (double)rest->min[k];
+    return target;
+}
+
+static bool append_view(enum render_coherence coherence, const struct render_light_target *targets,
+                        struct render_light_view *view, dipole_status *status)
+{
+    if (coherence == RENDER_COHERENCE_SURFACE)
+        return render_cell_samples_append(targets, view, status);
+    if (coherence != RENDER_COHERENCE_TWO_PASS)
+        return render_light_samples_append(targets, view, status);
+    view->flux_factor = 0.5;
+    if (!render_light_samples_append(targets, view, status))
+        return false;
+    view->is_shifted = true;
+    return render_light_samples_append(targets, view, status);
+}
+
 bool render_splatter_sample_view(struct render_splatter *splatter, const struct render_frame *frame,
                                  dipole_status *status)
 {
@@ -131,11 +159,15 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     float *const objects = plan->has_object_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
     const bool is_counted = plan->area == RENDER_AREA_OVERLAP;
     float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
-    bool done = targets && texels && (objects || !plan->has_object_ids) && (irradiance || !is_counted);
+    const bool is_fixed = plan->coherence == RENDER_COHERENCE_SURFACE;
+    float *const rest_mm = is_fixed ? read_view(frame, "light_rest", GL_RGBA, 4) : NULL;
+    bool done = targets && texels && (objects || !plan->has_object_ids) && (irradiance || !is_counted) &&
+                (rest_mm || !is_fixed);
     if (done) {
         struct render_light_view reduced = { .texels = texels,
                                              .objects = objects,
                                              .irradiance = irradiance,
+                                             .rest_mm = rest_mm,
                                              .size_px = view->size_px,
                                              .levels = view->levels };
         memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
@@ -143,8 +175,7 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
         for (size_t i = 0; i < object_count; i++) {
             const struct render_plan_object *const object = &plan->objects[i];
             if (object->spacing_mm > 0)
-                targets[i] = (struct render_light_target){ &splatter->of_medium[object->medium].bands[0],
-                                                           object->spacing_mm };
+                targets[i] = target_of(frame, i, &splatter->of_medium[object->medium].bands[0]);
         }
         /* Without ids all are alike, but some may be out of sight. */
         for (size_t i = 1; !objects && i < object_count; i++) {
@@ -152,7 +183,7 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
                 (!targets[0].samples || targets[i].spacing_mm < targets[0].spacing_mm))
                 targets[0] = targets[i];
         }
-        done = render_light_samples_append(targets, &reduced, status);
+        done = append_view(plan->coherence, targets, &reduced, status);
     } else {
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a light's view of %d texels a side",
                     view->size_px);
@@ -161,6 +192,7 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     free(texels);
     free(objects);
     free(irradiance);
+    free(rest_mm);
     return done;
 }
 
@@ -247,6 +279,27 @@ static bool add_samples(struct batch *batch, const struct render_light_samples *
     return true;
 }
 
+/* The next coarser samples of a medium. Those of the environment carry no codes of cubes at rest. */
+static bool merge_band(const struct render_plan *plan, double spacing_mm,
+                       const struct render_light_samples *finer, struct render_light_samples *coarser,
+                       dipole_status *status)
+{
+    if (plan->coherence != RENDER_COHERENCE_SURFACE || plan->has_environment)
+        return render_light_samples_merge(finer, spacing_mm, coarser, status);
+    int *const levels = calloc(plan->media->object_count, sizeof *levels);
+    if (!levels)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                           "no memory to merge the samples of %zu objects", plan->media->object_count);
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        if (plan->objects[i].cell_mm > 0)
+            levels[i] = (int)fmin(round(log2(spacing_mm / plan->objects[i].cell_mm)), 20);
+        levels[i] = levels[i] > 0 ? levels[i] : 0;
+    }
+    const bool done = render_cell_samples_merge(finer, levels, coarser, status);
+    free(levels);
+    return done;
+}
+
 /* first_node: of the medium's first band; moved on to the next medium's. */
 static bool add_medium(struct render_splatter *splatter, const struct render_plan *plan, size_t medium,
                        const struct render_table *table, size_t *first_node, struct batch *batch,
@@ -265,7 +318,7 @@ static bool add_medium(struct render_splatter *splatter, const struct render_pla
             .inverse_scale2 = (float)(1 / (axis.scale_mm * axis.scale_mm)),
             .nodes_per_log2 = (float)((axis.node_count - 1) / log2(1 + end * end)),
         };
-        if (b > 0 && !render_light_samples_merge(&samples[b - 1], band->spacing_mm, &samples[b], status))
+        if (b > 0 && !merge_band(plan, band->spacing_mm, &samples[b - 1], &samples[b], status))
             return false;
         if (!render_splats_append(&batch->splats, &samples[b], batch->sample_count, &plan->camera,
                                   band->r_outer_mm, &profile, status) ||
@@ -327,6 +380,12 @@ bool render_splatter_draw(struct render_splatter *splatter, const struct render_
 struct render_light_samples *render_splatter_samples(struct render_splatter *splatter, size_t medium)
 {
     return &splatter->of_medium[medium].bands[0];
+}
+
+const struct render_light_samples *render_splatter_band(const struct render_splatter *splatter,
+                                                        size_t medium, int band)
+{
+    return &splatter->of_medium[medium].bands[band];
 }
 
 size_t render_splatter_sample_count(const struct render_splatter *splatter)

@@ -26,6 +26,9 @@ DIPOLE_CHECKED bool render_splatter_draw(struct render_splatter *splatter, const
                                          dipole_status *status);
 
 /* The finest samples of a medium. */
+/* Samples of a medium in one of its bands, as they were drawn last. */
+const struct render_light_samples *render_splatter_band(const struct render_splatter *splatter,
+                                                        size_t medium, int band);
 struct render_light_samples *render_splatter_samples(struct render_splatter *splatter, size_t medium);
 size_t render_splatter_sample_count(const struct render_splatter *splatter);
 size_t render_splatter_splat_count(const struct render_splatter *splatter);

@@ -270,7 +270,11 @@ bool render_tsm_use_vertices(const struct render_frame *frame, dipole_status *st
     struct render_tsm *tsm;
     if (!render_executor_need_tsm(frame, &tsm, status))
         return false;
-    if (!tsm->vertices) { /* objects do not change */
+    bool is_stale = !tsm->vertices;
+    for (size_t i = 0; i < scene->object_count; i++)
+        is_stale |= scene->objects[i].motion != NULL;
+    if (is_stale) {
+        delete_texture(&tsm->vertices);
         float(*const texels)[4] = calloc(rows * RENDER_VERTEX_ROW, sizeof *texels);
         if (!texels)
             return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu vertices",

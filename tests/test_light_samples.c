@@ -31,7 +31,7 @@ static struct render_light_samples reduce(const float *texels, double spacing_mm
         .texels = texels, .size_px = SIDE, .forward = { 0, 0, -1 }, .rgb = { 1, 2, 4 }, .levels = LEVELS
     };
     struct render_light_samples samples = { 0 };
-    const struct render_light_target target = { &samples, spacing_mm };
+    const struct render_light_target target = { .samples = &samples, .spacing_mm = spacing_mm };
     assert_true(render_light_samples_append(&target, &view, NULL));
     return samples;
 }
@@ -243,7 +243,7 @@ static void quarters_come_one_after_the_other(void **state)
                                                 .forward = { 0, 0, -1 },
                                                 .rgb = { 1, 2, 4 },
                                                 .levels = LEVELS };
-        const struct render_light_target target = { &parts, 0.8 };
+        const struct render_light_target target = { .samples = &parts, .spacing_mm = 0.8 };
         assert_true(render_light_samples_append(&target, &view, NULL));
     }
     assert_int_equal(whole.count, parts.count);

@@ -2,6 +2,7 @@
 #include "check.h"
 #include "scenes.h"
 
+#include "io/scene_motion.h"
 #include "renderer/plan.h"
 #include "renderer/splats.h"
 
@@ -48,15 +49,18 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     struct test_scene test;
     init_sphere(&test);
     const struct io_material other = skin1();
-    enum { REQUESTS = 15, FIRST_AROUND = 11 };
+    enum { REQUESTS = 16, FIRST_AROUND = 11, MOVING = 15 };
     struct render_request requests[REQUESTS];
     for (int i = 0; i < REQUESTS; i++)
         requests[i] = request_for(&test);
+    requests[0].technique = RENDER_TECHNIQUE_SPLAT;
     requests[1].technique = RENDER_TECHNIQUE_LAMBERT;
     requests[2].is_captured = true;
     requests[3].is_tone_mapped = true;
     bool was_active[RENDER_EFFECT_LIMIT] = { false }, was_inactive[RENDER_EFFECT_LIMIT] = { false };
     requests[6].area = RENDER_AREA_OVERLAP;
+    /* the last: its object is deformed and moves over two frames */
+    struct io_motion motion = { .track_count = 1, .key_count = 1, .stretch = 1 };
     for (int i = 7; i < 11; i++)
         requests[i].technique = RENDER_TECHNIQUE_TSM;
     requests[8].tsm = (struct render_tsm_options){ .response = RENDER_TSM_EXACT, .layer_count = 4 };
@@ -69,11 +73,17 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     test.scene.environment.rgb[0] = 1;
     strcpy(test.scene.environment.path, SOURCE_FOLDER "/scenes/probes/studio.exr");
     for (int i = 0; i < REQUESTS; i++) {
-        test.scene.has_environment = i >= FIRST_AROUND;
+        test.scene.has_environment = i >= FIRST_AROUND && i < MOVING;
         test.objects[0].has_specular = i == 3;
         if (i == 5)
             assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 2, 5, &other));
         test.scene.light_count = i == 4 ? 0 : 1;
+        if (i == MOVING) {
+            test.scene.frames.count = 2;
+            test.objects[0].motion = &motion;
+            test.objects[0].pose.deform_count = 1;
+            test.objects[0].pose.is_moved = true;
+        }
         struct render_plan *const plan = plan_for(&requests[i]);
         for (size_t e = 0; render_effects[e]; e++) {
             const struct render_decision *const decision = &plan->decisions[e];

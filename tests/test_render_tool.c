@@ -196,6 +196,8 @@ static void wrong_usage_is_code_2(void **state)
                "render: --technique reference cannot be used with --context\n");
     fails_with(RENDER " sphere.json -o bad.exr -t tsm --splat-area overlap", 2,
                "render: --splat-area is of --technique splat alone\n");
+    fails_with(RENDER " sphere.json -o bad.exr -t tsm --coherence surface", 2,
+               "render: --coherence is of --technique gather and splat alone\n");
     static const char *const tsm_options[] = { "--tsm vertex", "--tsm-response exact", "--tsm-part local",
                                                "--tsm-samples 53", "--peel 2" };
     for (size_t i = 0; i < sizeof tsm_options / sizeof *tsm_options; i++) {

@@ -690,7 +690,7 @@ static void wrong_values_are_refused(void **state)
         /* objects */
         { { .object = "" }, "4:13: objects[0].material is missing, it is required here" },
         { { .object = "\"material\": " MATERIAL },
-          "4:13: objects[0].mesh is missing, expected it, or primitive" },
+          "4:13: objects[0].mesh is missing, expected it, primitive or mesh_sequence" },
         { { .object = "\"mesh\": \"a.obj\", " OBJECT },
           "4:44: objects[0].primitive stands beside mesh, expected one of the two" },
         { { .object = "\"mesh\": \"a.obj\", \"detail\": 8, \"material\": " MATERIAL },
@@ -711,7 +711,7 @@ static void wrong_values_are_refused(void **state)
           "4:26: objects[0].specular is a number, expected true or false" },
         { { .object = "\"colour\": 1, " OBJECT },
           "4:14: unknown key \"colour\" in objects[0], expected material, mesh, primitive, detail, name, "
-          "transform, roughness, specular" },
+          "transform, roughness, specular, mesh_sequence, deform, motion" },
         { { .object = "\"transform\": {\"scale\": 0}, " OBJECT },
           "4:37: objects[0].transform.scale is 0, expected 1e-06 to 1e+06, or the same below 0 to mirror" },
         { { .object = "\"transform\": {\"scale\": [1, 0, 1]}, " OBJECT },

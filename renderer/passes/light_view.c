@@ -41,7 +41,7 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_SCENE,
       .is_per_view = true,
       .writes = { "light_view" },
-      .writes_if_wanted = { "light_object", "light_irradiance" },
+      .writes_if_wanted = { "light_object", "light_irradiance", "light_rest" },
       .depth_written = "light_depth",
       .bind = bind },
 };

@@ -48,6 +48,7 @@ static void bind_resolve(const struct render_frame *frame)
 static const struct render_pass passes[] = {
     { .name = "surface_meshes",
       .draw = RENDER_DRAW_NOTHING,
+      .reads_if_written = { "posed_vertices" },
       .writes = { "mesh_triangles", "mesh_positions_mm", "mesh_normals", "mesh_roughness" },
       .run = render_executor_use_meshes },
     { .name = "surface",

@@ -47,6 +47,7 @@ static const struct render_pass passes[] = {
                  "tsm_form" },
       .reads_if_written = { "tsm_sources", "tsm_factors", "tsm_layers" },
       .writes = { "radiosity" },
+      .depth_tested = "position_depth",
       .bind = bind },
 };
 

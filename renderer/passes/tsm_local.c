@@ -40,6 +40,7 @@ static const struct render_pass passes[] = {
                  "tsm_kernel" },
       .reads_if_written = { "tsm_sources" },
       .writes = { "radiosity" },
+      .depth_tested = "position_depth",
       .bind = bind },
 };
 

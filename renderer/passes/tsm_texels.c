@@ -58,6 +58,7 @@ static const struct render_pass passes[] = {
       .is_added = true,
       .reads = { "position_mm", "tsm_position_mm", "tsm_normal", "tsm_flux", "tsm_sources" },
       .writes = { "radiosity" },
+      .depth_tested = "position_depth",
       .bind = bind,
       .run = draw },
 };

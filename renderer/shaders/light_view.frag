@@ -21,6 +21,17 @@ layout(location = 2) out float light_irradiance;  // that enters, per rgb of the
 layout(location = 1) out float light_irradiance;
 #endif
 #endif
+#ifdef HAS_LIGHT_REST
+#if defined(HAS_LIGHT_OBJECT) && defined(HAS_LIGHT_IRRADIANCE)
+#define REST_LOCATION 3
+#elif defined(HAS_LIGHT_OBJECT) || defined(HAS_LIGHT_IRRADIANCE)
+#define REST_LOCATION 2
+#else
+#define REST_LOCATION 1
+#endif
+in vec3 rest_mm;
+layout(location = REST_LOCATION) out vec4 light_rest;  // where the surface is when the object is at rest
+#endif
 
 void main()
 {
@@ -38,5 +49,8 @@ void main()
 #endif
 #ifdef HAS_LIGHT_OBJECT
     light_object = object;
+#endif
+#ifdef HAS_LIGHT_REST
+    light_rest = vec4(rest_mm, 1.0);
 #endif
 }
