@@ -28,15 +28,14 @@ static bool is_same_band(const struct render_band *a, const struct render_band *
     return a->spacing_mm == b->spacing_mm && a->cap_mm == b->cap_mm && a->r_outer_mm == b->r_outer_mm;
 }
 
-bool render_bands_are_same(const struct render_band_source *a, const struct render_band *a_bands,
-                           int a_count, const struct render_band_source *b,
-                           const struct render_band *b_bands, int b_count)
+bool render_band_keys_are_same(const struct render_band_key *a, const struct render_band_key *b)
 {
-    bool is_same = a->table == b->table && a->row == b->row && a->medium == b->medium && a_count == b_count;
+    bool is_same = a->source.table == b->source.table && a->source.row == b->source.row &&
+                   a->source.medium == b->source.medium && a->band_count == b->band_count;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        is_same = is_same && a->blur_mm[c] == b->blur_mm[c];
-    for (int i = 0; is_same && i < a_count; i++)
-        is_same = is_same_band(&a_bands[i], &b_bands[i]);
+        is_same = is_same && a->source.blur_mm[c] == b->source.blur_mm[c];
+    for (int i = 0; is_same && i < a->band_count; i++)
+        is_same = is_same_band(&a->bands[i], &b->bands[i]);
     return is_same;
 }
 

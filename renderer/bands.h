@@ -33,10 +33,13 @@ struct render_band_source {
     double blur_mm[IO_CHANNEL_COUNT];
 };
 
-/* Whether two profiles are the same in the same bands. */
-bool render_bands_are_same(const struct render_band_source *a, const struct render_band *a_bands,
-                           int a_count, const struct render_band_source *b,
-                           const struct render_band *b_bands, int b_count);
+/* What tables of bands are made for. */
+struct render_band_key {
+    struct render_band_source source;
+    int band_count; /* 0: of nothing */
+    struct render_band bands[RENDER_BAND_LIMIT];
+};
+bool render_band_keys_are_same(const struct render_band_key *a, const struct render_band_key *b);
 
 /* A profile in bands. */
 struct render_split {

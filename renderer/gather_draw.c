@@ -12,18 +12,10 @@
  * where epsilon of the lit is much, it is the one that counts. */
 #define OWN_SHARE 4
 
-/* What a medium's kernels were made for. */
-struct known {
-    struct render_band_source source;
-    int band_count;
-    struct render_band bands[RENDER_BAND_LIMIT];
-};
-
 struct render_gatherer {
     size_t medium_count;
-    struct known *known; /* of each medium */
+    struct render_band_key *keys; /* of each medium: what its kernels were made for */
     struct render_gather_medium *media;
-    struct render_gather_counts counts;
 };
 
 bool render_gatherer_create(const struct render_media *media, struct render_gatherer **gatherer_out,
@@ -33,11 +25,11 @@ bool render_gatherer_create(const struct render_media *media, struct render_gath
     struct render_gatherer *const gatherer = calloc(1, sizeof *gatherer);
     if (gatherer) {
         gatherer->medium_count = media->count;
-        gatherer->known = calloc(media->count, sizeof *gatherer->known);
+        gatherer->keys = calloc(media->count, sizeof *gatherer->keys);
         gatherer->media =
             aligned_alloc(_Alignof(struct render_gather_medium), media->count * sizeof *gatherer->media);
     }
-    if (!gatherer || !gatherer->known || !gatherer->media) {
+    if (!gatherer || !gatherer->keys || !gatherer->media) {
         render_gatherer_destroy(gatherer);
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to gather from %zu media",
                            media->count);
@@ -50,14 +42,9 @@ void render_gatherer_destroy(struct render_gatherer *gatherer)
 {
     if (!gatherer)
         return;
-    free(gatherer->known);
+    free(gatherer->keys);
     free(gatherer->media);
     free(gatherer);
-}
-
-const struct render_gather_counts *render_gatherer_counts(const struct render_gatherer *gatherer)
-{
-    return &gatherer->counts;
 }
 
 /* Kernels of the media that are seen, anew where the bands or the table have changed. */
@@ -66,23 +53,14 @@ static bool prepare_media(struct render_gatherer *gatherer, const struct render_
 {
     const struct render_plan *const plan = frame->plan;
     for (size_t m = 0; m < gatherer->medium_count; m++) {
-        const struct render_plan_medium *const planned = &plan->of_medium[m];
-        struct known *const known = &gatherer->known[m];
-        struct render_band_source source = { .table = frame->tables[m].lut,
-                                             .row = frame->tables[m].row,
-                                             .medium = &plan->media->media[m] };
-        memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
-        if (planned->band_count == 0 ||
-            render_bands_are_same(&known->source, known->bands, known->band_count, &source, planned->bands,
-                                  planned->band_count))
+        struct render_band_key *const known = &gatherer->keys[m];
+        const struct render_band_key key = render_plan_band_key(plan, &frame->tables[m], m);
+        if (key.band_count == 0 || render_band_keys_are_same(known, &key))
             continue;
         known->band_count = 0; /* until it is done */
-        if (!render_gather_medium_init(&source, planned->bands, planned->band_count, &gatherer->media[m],
-                                       status))
+        if (!render_gather_medium_init(&key.source, key.bands, key.band_count, &gatherer->media[m], status))
             return false;
-        known->source = source;
-        known->band_count = planned->band_count;
-        memcpy(known->bands, planned->bands, sizeof known->bands);
+        *known = key;
     }
     return true;
 }
@@ -211,8 +189,7 @@ static bool objects_init(const struct render_gatherer *gatherer, const struct re
 
 /* ---- a frame ------------------------------------------------------------------------------------ */
 
-static bool gather(struct render_gatherer *gatherer, const struct render_frame *frame,
-                   const struct objects *all, dipole_status *status)
+static bool gather(const struct render_frame *frame, const struct objects *all, dipole_status *status)
 {
     const struct render_plan *const plan = frame->plan;
     const size_t size = (size_t)plan->width_px * (size_t)plan->height_px * 4 * sizeof(float);
@@ -228,7 +205,7 @@ static bool gather(struct render_gatherer *gatherer, const struct render_frame *
     if (done) {
         glGetTextureImage(render_executor_texture(frame->executor, "position_mm"), 0, GL_RGBA, GL_FLOAT,
                           (GLsizei)size, position_mm);
-        done = render_gather_run(&request, radiosity, &gatherer->counts, status);
+        done = render_gather_run(&request, radiosity, NULL, status);
     } else {
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the places of %dx%d pixels",
                     plan->width_px, plan->height_px);
@@ -248,8 +225,8 @@ bool render_gatherer_run(struct render_gatherer *gatherer, const struct render_f
     struct objects all;
     if (!render_executor_need_splatter(frame, &splatter, status) || !prepare_media(gatherer, frame, status))
         return false;
-    const bool done = objects_init(gatherer, frame->plan, splatter, &all, status) &&
-                      gather(gatherer, frame, &all, status);
+    const bool done =
+        objects_init(gatherer, frame->plan, splatter, &all, status) && gather(frame, &all, status);
     objects_end(&all);
     return done;
 }

@@ -16,7 +16,4 @@ void render_gatherer_destroy(struct render_gatherer *gatherer);
 DIPOLE_CHECKED bool render_gatherer_run(struct render_gatherer *gatherer, const struct render_frame *frame,
                                         dipole_status *status);
 
-/* Of the last run. */
-const struct render_gather_counts *render_gatherer_counts(const struct render_gatherer *gatherer);
-
 #endif

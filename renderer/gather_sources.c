@@ -5,79 +5,25 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    AXIS_BITS = 21,
-    ORDER_BITS =
-        3, /* cubes by which samples are ordered are 2^3 times smaller than the second band's spacing */
-    DIGIT_BITS = 11,
-    DIGITS = 1 << DIGIT_BITS,
-};
+/* Cubes by which samples are ordered are 2^3 times smaller than the second band's spacing. */
+enum { ORDER_BITS = 3 };
 
 /* ---- order -------------------------------------------------------------------------------------- */
 
-/* A sample's cube as its place on the Z-order curve. */
-struct key {
-    uint64_t code;
-    uint32_t index;
-};
-
-/* Put two zeros between the low 21 bits. */
-static uint64_t spread_bits(uint64_t x)
-{
-    x &= 0x1fffff;
-    x = (x | x << 32) & 0x001f00000000ffff;
-    x = (x | x << 16) & 0x001f0000ff0000ff;
-    x = (x | x << 8) & 0x100f00f00f00f00f;
-    x = (x | x << 4) & 0x10c30c30c30c30c3;
-    return (x | x << 2) & 0x1249249249249249;
-}
-
-static uint64_t cube_code(const float position_mm[3], const double min_mm[3], double cell_mm)
-{
-    uint64_t code = 0;
-    for (int k = 0; k < 3; k++) {
-        const double cell = ((double)position_mm[k] - min_mm[k]) / cell_mm;
-        code |= spread_bits((uint64_t)fmin(cell, 0x1fffff)) << k;
-    }
-    return code;
-}
-
-/* Stable, digit by digit; those in which no two codes differ are left out. Swaps *keys and *spare. */
-static void sort_keys(struct key **keys, struct key **spare, size_t count)
-{
-    uint64_t differ = 0;
-    for (size_t i = 1; i < count; i++)
-        differ |= (*keys)[i].code ^ (*keys)[0].code;
-    for (int shift = 0; shift < 3 * AXIS_BITS; shift += DIGIT_BITS) {
-        if (!(differ >> shift & (DIGITS - 1)))
-            continue;
-        size_t ends[DIGITS] = { 0 };
-        for (size_t i = 0; i < count; i++)
-            ends[(*keys)[i].code >> shift & (DIGITS - 1)]++;
-        size_t start = 0;
-        for (int d = 0; d < DIGITS; d++) {
-            const size_t in_digit = ends[d];
-            ends[d] = start;
-            start += in_digit;
-        }
-        for (size_t i = 0; i < count; i++)
-            (*spare)[ends[(*keys)[i].code >> shift & (DIGITS - 1)]++] = (*keys)[i];
-        struct key *const sorted = *spare;
-        *spare = *keys;
-        *keys = sorted;
-    }
-}
-
 static void fill_keys(const struct render_light_sample *samples, size_t count, double cell_mm,
-                      struct key *keys)
+                      struct render_z_key *keys)
 {
     double min_mm[3] = { INFINITY, INFINITY, INFINITY };
     for (size_t i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++)
             min_mm[k] = fmin(min_mm[k], (double)samples[i].position_mm[k]);
     }
-    for (size_t i = 0; i < count; i++)
-        keys[i] = (struct key){ cube_code(samples[i].position_mm, min_mm, cell_mm), (uint32_t)i };
+    for (size_t i = 0; i < count; i++) {
+        const float *const at = samples[i].position_mm;
+        const double position_mm[3] = { (double)at[0], (double)at[1], (double)at[2] };
+        keys[i] =
+            (struct render_z_key){ .code = render_cube_code(position_mm, min_mm, cell_mm), .index = i };
+    }
 }
 
 /* ---- merging ------------------------------------------------------------------------------------ */
@@ -209,7 +155,7 @@ static bool level_init(const struct render_gather_source *sources, size_t count,
 struct workshop {
     struct render_gather_source *sources;
     uint64_t *codes;
-    struct key *keys, *spare;
+    struct render_z_key *keys, *spare;
 };
 
 static bool fill_levels(const struct render_light_sample *samples, size_t count,
@@ -218,10 +164,10 @@ static bool fill_levels(const struct render_light_sample *samples, size_t count,
 {
     const double finest_mm = bands[0].spacing_mm;
     fill_keys(samples, count, ldexp(finest_mm, 1 - ORDER_BITS), shop->keys);
-    sort_keys(&shop->keys, &shop->spare, count);
+    const struct render_z_key *const keys = render_light_samples_sort_keys(shop->keys, shop->spare, count);
     for (size_t i = 0; i < count; i++) {
-        const struct render_light_sample *const sample = &samples[shop->keys[i].index];
-        shop->codes[i] = shop->keys[i].code;
+        const struct render_light_sample *const sample = &samples[keys[i].index];
+        shop->codes[i] = keys[i].code;
         shop->sources[i] = (struct render_gather_source){ .spread_mm2 = { 0 } };
         memcpy(shop->sources[i].position_mm, sample->position_mm, sizeof sample->position_mm);
         memcpy(shop->sources[i].flux_w, sample->flux_w, sizeof sample->flux_w);

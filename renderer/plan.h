@@ -220,6 +220,10 @@ DIPOLE_CHECKED bool render_plan_check_request(const struct io_scene *scene, doub
 /* Whether a light is not black. */
 bool render_light_shines(const struct io_light *light);
 
+/* What a medium's bands are tabulated by. */
+struct render_band_key render_plan_band_key(const struct render_plan *plan,
+                                            const struct render_table *table, size_t medium);
+
 /* Whether light samples are summed: by splats or by gathering. */
 bool render_plan_sums_samples(const struct render_plan *plan);
 

@@ -14,17 +14,10 @@ struct medium_samples {
     struct render_light_samples bands[RENDER_BAND_LIMIT];
 };
 
-/* What a table of bands was made for. */
-struct table_key {
-    struct render_band_source source;
-    int band_count;
-    struct render_band bands[RENDER_BAND_LIMIT];
-};
-
 struct render_splatter {
     size_t medium_count;
     struct medium_samples *of_medium;
-    struct table_key *keys; /* of what table_buffer holds, medium by medium */
+    struct render_band_key *keys; /* of what table_buffer holds, medium by medium */
     size_t splat_count, dropped_count;
     GLuint vertex_array, splat_buffer;
     struct render_buffer_texture sample_buffer, table_buffer;
@@ -198,16 +191,6 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
 
 /* ---- splats ------------------------------------------------------------------------------------- */
 
-static struct render_band_source source_of(const struct render_plan *plan,
-                                           const struct render_table *tables, size_t medium)
-{
-    struct render_band_source source = { .table = tables[medium].lut,
-                                         .row = tables[medium].row,
-                                         .medium = &plan->media->media[medium] };
-    memcpy(source.blur_mm, plan->of_medium[medium].blur_mm, sizeof source.blur_mm);
-    return source;
-}
-
 /* Fill the buffer of profiles, all media one after the other, unless it holds them already. */
 static bool fill_table(struct render_splatter *splatter, const struct render_frame *frame,
                        const struct render_table *tables, dipole_status *status)
@@ -216,13 +199,10 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     bool is_known = splatter->table_buffer.texture != 0;
     size_t node_count = 0;
     for (size_t m = 0; m < splatter->medium_count; m++) {
-        const struct render_plan_medium *const planned = &plan->of_medium[m];
-        const struct table_key *const key = &splatter->keys[m];
-        const struct render_band_source source = source_of(plan, tables, m);
-        is_known &= render_bands_are_same(&key->source, key->bands, key->band_count, &source,
-                                          planned->bands, planned->band_count);
-        if (planned->band_count > 0)
-            node_count += (size_t)planned->band_count * (size_t)render_bands_axis(&source).node_count;
+        const struct render_band_key key = render_plan_band_key(plan, &tables[m], m);
+        is_known &= render_band_keys_are_same(&splatter->keys[m], &key);
+        if (key.band_count > 0)
+            node_count += (size_t)key.band_count * (size_t)render_bands_axis(&key.source).node_count;
     }
     if (is_known)
         return true;
@@ -232,23 +212,17 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
                            node_count);
     bool done = true;
     for (size_t m = 0; done && m < splatter->medium_count; m++) {
-        const struct render_plan_medium *const planned = &plan->of_medium[m];
-        const struct render_band_source source = source_of(plan, tables, m);
-        if (planned->band_count == 0)
+        const struct render_band_key key = render_plan_band_key(plan, &tables[m], m);
+        if (key.band_count == 0)
             continue;
-        done = render_bands_bake(&source, planned->bands, planned->band_count, next, status);
-        next += (size_t)planned->band_count * (size_t)render_bands_axis(&source).node_count * 4;
+        done = render_bands_bake(&key.source, key.bands, key.band_count, next, status);
+        next += (size_t)key.band_count * (size_t)render_bands_axis(&key.source).node_count * 4;
     }
     if (done)
         render_buffer_texture_fill(&splatter->table_buffer, GL_RGBA32F, nodes,
                                    node_count * 4 * sizeof *nodes);
-    for (size_t m = 0; done && m < splatter->medium_count; m++) {
-        const struct render_plan_medium *const planned = &plan->of_medium[m];
-        struct table_key *const key = &splatter->keys[m];
-        *key =
-            (struct table_key){ .source = source_of(plan, tables, m), .band_count = planned->band_count };
-        memcpy(key->bands, planned->bands, sizeof key->bands);
-    }
+    for (size_t m = 0; done && m < splatter->medium_count; m++)
+        splatter->keys[m] = render_plan_band_key(plan, &tables[m], m);
     free(nodes);
     return done;
 }
