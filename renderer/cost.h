@@ -29,6 +29,8 @@
 #define RENDER_COST_GATHER_EVALUATION 1.4 /* one merged sample at one place, its list included  */
 #define RENDER_COST_GATHER_PIXEL 60.0     /* interpolated                                 */
 #define RENDER_COST_GATHER_SAMPLE 70.0    /* ordered and merged                           */
+#define RENDER_COST_GATHER_PLACE 100.0    /* read back, its tile's lists made     */
+#define RENDER_COST_GATHER_GL 12.0        /* one merged sample at one place, by llvmpipe        */
 #define RENDER_COST_MAP_TEXEL 37.0        /* of a translucent shadow map: drawn, levels made  */
 #define RENDER_COST_MAP_SAMPLE 66.0       /* one sample of a map at one point             */
 #define RENDER_COST_MAP_LAYER 25.0        /* each layer that it looks into                */
@@ -43,6 +45,9 @@
 #define RENDER_COST_TREE_TRIANGLE 500.0 /* of the tree that they are traced through */
 #define RENDER_COST_SCREEN_PIXEL 6.0    /* touched by a simple pass                     */
 #define RENDER_COST_POINTS_PIXEL 180.0  /* whose four points are looked at */
+
+/* What a shader takes with a GPU, of what llvmpipe takes: assumed, none was at hand. */
+#define RENDER_COST_GPU_SHARE 0.02
 
 static inline double render_cost_ms(double ns_each, double count)
 {
@@ -167,6 +172,20 @@ static inline double render_cost_gather_evaluations(const struct render_plan *pl
         }
     }
     return excess * count;
+}
+
+static inline double render_cost_gather_ms(const struct render_plan *plan, enum render_gather gather,
+                                           bool has_gpu)
+{
+    const double evaluations = render_cost_gather_evaluations(plan);
+    const double samples_ms = render_cost_ms(RENDER_COST_GATHER_SAMPLE, render_cost_samples(plan));
+    if (gather == RENDER_GATHER_GL)
+        return RENDER_COST_PROGRAM_MS + samples_ms +
+               render_cost_ms(RENDER_COST_GATHER_PLACE, plan->covered_px) +
+               render_cost_ms((has_gpu ? RENDER_COST_GPU_SHARE : 1) * RENDER_COST_GATHER_GL, evaluations);
+    return samples_ms + render_cost_ms(RENDER_COST_GATHER_PIXEL, plan->covered_px) +
+           render_cost_ms(RENDER_COST_GATHER_EVALUATION, evaluations) +
+           render_cost_ms(RENDER_COST_SCREEN_PIXEL, 4 * render_cost_pixels(plan));
 }
 
 #endif

@@ -18,6 +18,7 @@ const struct render_effect *const render_effects[] = {
     &render_effect_splat,
     &render_effect_overlap,
     &render_effect_gather,
+    &render_effect_gather_gl,
     &render_effect_tsm_table,
     &render_effect_tsm_exact,
     &render_effect_tsm_light,

@@ -16,6 +16,7 @@ extern const struct render_effect render_effect_lambert;
 extern const struct render_effect render_effect_splat;
 extern const struct render_effect render_effect_overlap;
 extern const struct render_effect render_effect_gather;
+extern const struct render_effect render_effect_gather_gl;
 extern const struct render_effect render_effect_tsm_table;
 extern const struct render_effect render_effect_tsm_exact;
 extern const struct render_effect render_effect_tsm_light;

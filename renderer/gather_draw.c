@@ -1,6 +1,7 @@
 #include "renderer/gather_draw.h"
 
 #include "lutgen/parallel.h"
+#include "renderer/gather_gl.h"
 #include "renderer/splat_draw.h"
 
 #include <math.h>
@@ -16,6 +17,7 @@ struct render_gatherer {
     size_t medium_count;
     struct render_band_key *keys; /* of each medium: what its kernels were made for */
     struct render_gather_medium *media;
+    struct render_gather_gl *gl; /* NULL until OpenGL first gathers */
 };
 
 bool render_gatherer_create(const struct render_media *media, struct render_gatherer **gatherer_out,
@@ -42,6 +44,7 @@ void render_gatherer_destroy(struct render_gatherer *gatherer)
 {
     if (!gatherer)
         return;
+    render_gather_gl_destroy(gatherer->gl);
     free(gatherer->keys);
     free(gatherer->media);
     free(gatherer);
@@ -189,33 +192,52 @@ static bool objects_init(const struct render_gatherer *gatherer, const struct re
 
 /* ---- a frame ------------------------------------------------------------------------------------ */
 
-static bool gather(const struct render_frame *frame, const struct objects *all, dipole_status *status)
+static size_t picture_size(const struct render_plan *plan)
+{
+    return (size_t)plan->width_px * (size_t)plan->height_px * 4 * sizeof(float);
+}
+
+/* What is asked for, and where the pixels' places are read to. */
+static bool make_request(const struct render_frame *frame, const struct objects *all, float *position_mm,
+                         struct render_gather_request *request, dipole_status *status)
 {
     const struct render_plan *const plan = frame->plan;
-    const size_t size = (size_t)plan->width_px * (size_t)plan->height_px * 4 * sizeof(float);
-    float *const position_mm = malloc(size), *const radiosity = calloc(1, size);
-    const struct render_gather_request request = { .width_px = plan->width_px,
-                                                   .height_px = plan->height_px,
-                                                   .position_mm = position_mm,
-                                                   .objects = all->objects,
-                                                   .object_count = all->count,
-                                                   .epsilon = plan->interpolation_epsilon,
-                                                   .own_epsilon = OWN_SHARE * plan->epsilon };
-    bool done = position_mm && radiosity;
-    if (done) {
-        glGetTextureImage(render_executor_texture(frame->executor, "position_mm"), 0, GL_RGBA, GL_FLOAT,
-                          (GLsizei)size, position_mm);
-        done = render_gather_run(&request, radiosity, NULL, status);
-    } else {
-        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the places of %dx%d pixels",
-                    plan->width_px, plan->height_px);
-    }
+    if (!position_mm)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the places of %dx%d pixels",
+                           plan->width_px, plan->height_px);
+    glGetTextureImage(render_executor_texture(frame->executor, "position_mm"), 0, GL_RGBA, GL_FLOAT,
+                      (GLsizei)picture_size(plan), position_mm);
+    *request = (struct render_gather_request){ .width_px = plan->width_px,
+                                               .height_px = plan->height_px,
+                                               .position_mm = position_mm,
+                                               .objects = all->objects,
+                                               .object_count = all->count,
+                                               .epsilon = plan->interpolation_epsilon,
+                                               .own_epsilon = OWN_SHARE * plan->epsilon };
+    return true;
+}
+
+static bool gather(const struct render_frame *frame, const struct render_gather_request *request,
+                   dipole_status *status)
+{
+    float *const radiosity = calloc(1, picture_size(frame->plan));
+    if (!radiosity)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                           "no memory for the radiosity of %dx%d pixels", request->width_px,
+                           request->height_px);
+    const bool done = render_gather_run(request, radiosity, NULL, status);
     if (done)
-        glTextureSubImage2D(render_executor_texture(frame->executor, "radiosity"), 0, 0, 0, plan->width_px,
-                            plan->height_px, GL_RGBA, GL_FLOAT, radiosity);
-    free(position_mm);
+        glTextureSubImage2D(render_executor_texture(frame->executor, "radiosity"), 0, 0, 0,
+                            request->width_px, request->height_px, GL_RGBA, GL_FLOAT, radiosity);
     free(radiosity);
     return done;
+}
+
+static bool gather_by_gl(struct render_gatherer *gatherer, const struct render_frame *frame,
+                         const struct render_gather_request *request, dipole_status *status)
+{
+    return (gatherer->gl || render_gather_gl_create(&gatherer->gl, status)) &&
+           render_gather_gl_draw(gatherer->gl, frame, request, status);
 }
 
 bool render_gatherer_run(struct render_gatherer *gatherer, const struct render_frame *frame,
@@ -223,10 +245,16 @@ bool render_gatherer_run(struct render_gatherer *gatherer, const struct render_f
 {
     struct render_splatter *splatter;
     struct objects all;
+    struct render_gather_request request;
     if (!render_executor_need_splatter(frame, &splatter, status) || !prepare_media(gatherer, frame, status))
         return false;
+    float *const position_mm = malloc(picture_size(frame->plan));
     const bool done =
-        objects_init(gatherer, frame->plan, splatter, &all, status) && gather(frame, &all, status);
+        objects_init(gatherer, frame->plan, splatter, &all, status) &&
+        make_request(frame, &all, position_mm, &request, status) &&
+        (frame->plan->gather == RENDER_GATHER_GL ? gather_by_gl(gatherer, frame, &request, status)
+                                                 : gather(frame, &request, status));
     objects_end(&all);
+    free(position_mm);
     return done;
 }

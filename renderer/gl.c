@@ -36,6 +36,19 @@ bool render_gl_start(GLADloadfunc load, struct render_gl_errors *errors, dipole_
     return true;
 }
 
+bool render_gl_is_software(void)
+{
+    static const char *const names[] = {
+        "llvmpipe", "softpipe", "swrast", "SWR", "Software", "SwiftShader"
+    };
+    const char *const renderer = (const char *)glGetString(GL_RENDERER);
+    for (size_t i = 0; renderer && i < sizeof names / sizeof *names; i++) {
+        if (strstr(renderer, names[i]))
+            return true;
+    }
+    return false;
+}
+
 bool render_gl_check(struct render_gl_errors *errors, const char *doing, dipole_status *status)
 {
     const GLenum code = glGetError();

@@ -20,6 +20,9 @@ DIPOLE_CHECKED bool render_gl_start(GLADloadfunc load, struct render_gl_errors *
 DIPOLE_CHECKED bool render_gl_check(struct render_gl_errors *errors, const char *doing,
                                     dipole_status *status);
 
+/* Whether the current context draws on the processor: llvmpipe, softpipe or the like. */
+bool render_gl_is_software(void);
+
 /* A GLSL file: its name below shaders/, and its text. */
 struct render_shader {
     const char *name, *text;

@@ -18,7 +18,7 @@ struct options {
     struct cli_texts allowed_paths;
     const char *output_path, *table_folder, *camera_name;
     double epsilon;
-    int technique, context, area, coherence;
+    int technique, context, area, coherence, gather;
     int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int environment_samples;
     double ambient_visibility; /* rays */
@@ -297,6 +297,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                        .drawing = { .technique = (enum render_technique)options->technique,
                                     .area = (enum render_area)options->area,
                                     .coherence = (enum render_coherence)options->coherence,
+                                    .gather = (enum render_gather)options->gather,
                                     .epsilon = options->epsilon,
                                     .environment_samples =
                                         (enum render_environment_samples)options->environment_samples,
@@ -322,6 +323,7 @@ static bool check_usage(const struct options *options, dipole_status *status)
     const enum render_technique technique = (enum render_technique)options->technique;
     const bool is_splat = technique == RENDER_TECHNIQUE_AUTO || technique == RENDER_TECHNIQUE_SPLAT;
     const bool has_samples = is_splat || technique == RENDER_TECHNIQUE_GATHER;
+    const bool may_gather = technique == RENDER_TECHNIQUE_AUTO || technique == RENDER_TECHNIQUE_GATHER;
     const bool is_reference = technique == RENDER_TECHNIQUE_REFERENCE;
     const bool has_tsm_options = options->tsm_gather || options->tsm_response || options->tsm_part ||
                                  options->tsm_samples || options->layer_pairs;
@@ -340,6 +342,8 @@ static bool check_usage(const struct options *options, dipole_status *status)
           "--splat-area is of --technique splat alone" },
         { options->coherence != RENDER_COHERENCE_AUTO && !has_samples && !options->is_viewed,
           "--coherence is of --technique gather and splat alone" },
+        { options->gather != RENDER_GATHER_AUTO && !may_gather && !options->is_viewed,
+          "--gather is of --technique gather alone" },
         { options->environment_samples && !has_samples && !options->is_viewed,
           "--environment-samples is of --technique gather and splat alone" },
         { options->ambient_visibility != floor(options->ambient_visibility),
@@ -491,6 +495,14 @@ int main(int argc, char **argv)
               "light's view sampled twice; surface, samples stay on the surface. Default auto: surface, "
               "where light or objects move.",
           .choices = render_coherence_names },
+        { .name = "gather",
+          .kind = CLI_CHOICE,
+          .target = &options.gather,
+          .argument = "WHERE",
+          .help =
+              "What gathers: c, the processor; gl, OpenGL's shaders. Default auto: what is predicted to "
+              "be faster.",
+          .choices = render_gather_names },
         { .name = "context",
           .kind = CLI_CHOICE,
           .target = &options.context,

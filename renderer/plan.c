@@ -1,5 +1,7 @@
 #include "renderer/plan_internal.h"
 
+#include "renderer/cost.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -294,6 +296,24 @@ static void choose_technique(const struct render_request *request, struct render
         plan->area = RENDER_AREA_FLUX;
 }
 
+const char *const render_gather_names[] = { "auto", "c", "gl", NULL };
+
+/* Needs the bands. */
+static void choose_gather(const struct render_request *request, struct render_plan *plan)
+{
+    const double by_c_ms = render_cost_gather_ms(plan, RENDER_GATHER_C, request->has_gpu),
+                 by_gl_ms = render_cost_gather_ms(plan, RENDER_GATHER_GL, request->has_gpu);
+    plan->has_gpu = request->has_gpu;
+    plan->gather = by_gl_ms < by_c_ms ? RENDER_GATHER_GL : RENDER_GATHER_C;
+    if (plan->technique != RENDER_TECHNIQUE_GATHER)
+        plan->gather = RENDER_GATHER_C;
+    else if (request->gather != RENDER_GATHER_AUTO)
+        plan->gather = request->gather;
+    snprintf(plan->gather_reason, sizeof plan->gather_reason, "%s: %.3g ms in C, %.3g by %sOpenGL",
+             request->gather == RENDER_GATHER_AUTO ? "predicted" : "asked for; predicted", by_c_ms,
+             by_gl_ms, request->has_gpu ? "" : "software ");
+}
+
 /* ---- the plan ----------------------------------------------------------------------------------- */
 
 static void decide(const struct render_request *request, struct render_plan *plan)
@@ -330,6 +350,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_settle_spacing(request, plan);
         render_plan_predict_error(request, plan);
         render_plan_predict_map_error(request, plan);
+        choose_gather(request, plan);
         decide(request, plan);
         done = render_plan_add_passes(plan, render_effects, status);
     }

@@ -27,6 +27,8 @@ struct render_request {
     enum render_technique technique;
     enum render_area area;
     enum render_coherence coherence;
+    enum render_gather gather;
+    bool has_gpu;     /* OpenGL is not software */
     bool is_captured; /* no scattering; what it would need is kept instead */
     bool is_tone_mapped;
 };
@@ -156,6 +158,9 @@ struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
     enum render_area area;
     enum render_coherence coherence; /* never AUTO; NONE where no light samples move */
+    enum render_gather gather;       /* never AUTO; C unless the technique is GATHER */
+    char gather_reason[96];          /* why */
+    bool has_gpu;                    /* OpenGL is not software */
     size_t deformed_vertex_count, moved_vertex_count;
     double epsilon;
     const struct render_media *media;

@@ -34,10 +34,12 @@ bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                       renderer->context->make_current(renderer->context, status) &&
                       render_gl_start(renderer->context->load, &renderer->errors, status) &&
                       render_executor_create(scene, &renderer->errors, &renderer->executor, status);
-    if (done)
+    if (done) {
+        renderer->has_gpu = !render_gl_is_software();
         *renderer_out = renderer;
-    else
+    } else {
         render_destroy(renderer);
+    }
     return done;
 }
 
@@ -123,6 +125,7 @@ bool render_run(struct renderer *renderer, const struct render_request *request_
     const struct render_table *tables;
     struct render_request request = *request_in;
     request.environment = renderer->environment;
+    request.has_gpu = renderer->has_gpu;
     *plan_out = NULL;
     struct render_plan *plan = NULL;
     render_media_measure(renderer->scene, renderer->media);
@@ -208,6 +211,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .technique = options->technique,
         .area = options->area,
         .coherence = options->coherence,
+        .gather = options->gather,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
         .media = renderer->media,
         .tables = options->tables,

@@ -45,6 +45,11 @@ enum render_coherence {
     RENDER_COHERENCE_SURFACE,
 };
 extern const char *const render_coherence_names[]; /* "auto", "none", "two-pass", "surface", NULL */
+
+/* What gathers: the processor, in C, or OpenGL's shaders. The default is what the plan takes for faster. */
+enum render_gather { RENDER_GATHER_AUTO = 0, RENDER_GATHER_C, RENDER_GATHER_GL };
+extern const char *const render_gather_names[]; /* "auto", "c", "gl", NULL */
+
 /* Where light from all around is sampled: on the triangles; or as in the paper, on layers peeled along y;
  * or along all three axes. */
 enum render_environment_samples {
@@ -137,6 +142,7 @@ struct render_options {
     double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
     enum render_area area;
     enum render_coherence coherence;
+    enum render_gather gather;
     const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
     struct render_tsm_options tsm;

@@ -12,6 +12,7 @@ struct renderer {
     struct render_context *context;
     struct render_gl_errors errors;
     struct render_executor *executor;
+    bool has_gpu; /* OpenGL is not software */
     struct render_media *media;
     struct render_environment *environment; /* NULL: the scene has none */
     struct render_tables *tables;   /* baked when a plan first needed them, to the finest asked so far */

@@ -6,7 +6,8 @@
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+struct render_decision render_decide_gather(const struct render_request *request,
+                                            const struct render_plan *plan)
 {
     if (request->is_captured)
         return render_not_called_for("captured without scattering");
@@ -16,24 +17,28 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no channel scatters");
     if (render_plan_dark_reason(plan))
         return render_not_called_for("%s", render_plan_dark_reason(plan));
-    return render_called_for("scattered light reaches %.3g mm, %.3g pixels, in %d bands", plan->r_max_mm,
-                             plan->r_max_px, plan->band_count);
+    return render_called_for("reaches %.3g mm, %.3g pixels, in %d bands (%s)", plan->r_max_mm,
+                             plan->r_max_px, plan->band_count, plan->gather_reason);
+}
+
+static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
+{
+    if (plan->gather != RENDER_GATHER_C)
+        return render_not_called_for("gathered by OpenGL (%s)", plan->gather_reason);
+    return render_decide_gather(request, plan);
 }
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return render_cost_ms(RENDER_COST_GATHER_PIXEL, plan->covered_px) +
-           render_cost_ms(RENDER_COST_GATHER_EVALUATION, render_cost_gather_evaluations(plan)) +
-           render_cost_ms(RENDER_COST_GATHER_SAMPLE, render_cost_samples(plan)) +
-           render_cost_ms(RENDER_COST_SCREEN_PIXEL, 4 * render_cost_pixels(plan));
+    return render_cost_gather_ms(plan, RENDER_GATHER_C, plan->has_gpu);
 }
 
-static double error(const struct render_plan *plan)
+double render_gather_error(const struct render_plan *plan)
 {
     return plan->truncation_error + plan->banding_error + plan->table_error;
 }
 
-static bool run(const struct render_frame *frame, dipole_status *status)
+bool render_run_gather(const struct render_frame *frame, dipole_status *status)
 {
     struct render_gatherer *gatherer;
     return render_executor_need_gatherer(frame, &gatherer, status) &&
@@ -45,7 +50,7 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_NOTHING,
       .reads = { "position_mm", "light_samples" },
       .writes = { "radiosity" },
-      .run = run },
+      .run = render_run_gather },
 };
 
 const struct render_effect render_effect_gather = {
@@ -54,7 +59,7 @@ const struct render_effect render_effect_gather = {
               "and Hut 1986",
     .decide = decide,
     .cost_ms = cost_ms,
-    .error = error,
+    .error = render_gather_error,
     .passes = passes,
     .pass_count = COUNT(passes),
 };
