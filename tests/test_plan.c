@@ -49,7 +49,7 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     struct test_scene test;
     init_sphere(&test);
     const struct io_material other = skin1();
-    enum { REQUESTS = 16, FIRST_AROUND = 11, MOVING = 15 };
+    enum { REQUESTS = 17, FIRST_AROUND = 11, MOVING = 15, BY_OPENGL = 16 };
     struct render_request requests[REQUESTS];
     for (int i = 0; i < REQUESTS; i++)
         requests[i] = request_for(&test);
@@ -70,6 +70,7 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     requests[12].ambient_visibility = 4;
     requests[13].technique = RENDER_TECHNIQUE_LAMBERT;
     requests[14].technique = RENDER_TECHNIQUE_SPLAT;
+    requests[BY_OPENGL].gather = RENDER_GATHER_GL;
     test.scene.environment.rgb[0] = 1;
     strcpy(test.scene.environment.path, SOURCE_FOLDER "/scenes/probes/studio.exr");
     for (int i = 0; i < REQUESTS; i++) {
