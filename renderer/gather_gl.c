@@ -123,7 +123,7 @@ static bool fill_kernels(struct render_gather_gl *gl, const struct render_gather
                          dipole_status *status)
 {
     const size_t count = request->object_count * RENDER_BAND_LIMIT, of_kernel = (size_t)4 * KERNEL_TEXELS;
-    float *const texels = calloc(count, of_kernel * sizeof *texels);
+    float *const texels = calloc(count + 1, of_kernel * sizeof *texels);
     if (!texels)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu bands", count);
     for (size_t o = 0; o < request->object_count; o++) {
