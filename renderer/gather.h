@@ -11,11 +11,12 @@
 /* Pixels of a level are 2^level apart. */
 enum { RENDER_GATHER_LEVELS = 6 };
 
-/* The finest band's samples are merged in cubes of so many of their spacings: Rd has bends there, which
- * samples that stand for all within a cube as wide as their spacing would miss. */
-#define RENDER_GATHER_FINEST 0.7
-
-/* Caps so many spacings wide keep what merging errs by, relative RMSE, at error. */
+/*
+ * The finest band's samples are merged in cubes of so many spacings of T11, and each band's cap is so many
+ * of its own spacings wide, that merging errs by error, relative RMSE: measured over all measured
+ * materials, on wavy surfaces at any angle, at edges of light and steps (theory.md T43).
+ */
+double render_gather_finest_spacings(double error);
 double render_gather_cap_spacings(double error);
 
 /* A medium's bands, and how much they can change from place to place. */

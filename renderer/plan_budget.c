@@ -8,16 +8,17 @@
 /*
  * How epsilon is shared out. Little may be cut off beyond r_max, of the sum and so of the table: where an
  * object is lit from behind, light from afar is all there is. A tenth of epsilon made a back-lit bunny 5 %
- * too dark in places; another band costs little. A third is left for what has no bound of its own, the
- * texels of the lights' views and bands on curved surfaces.
+ * too dark in places; another band costs little. Of splats a third is left for what has no bound of its
+ * own, the texels of the lights' views and bands on curved surfaces.
  */
 #define TRUNCATION_SHARE 0.02
 #define ALIASING_SHARE 0.58
 #define BANDING_SHARE 0.02
 #define TABLE_SHARE 0.02
 
-/* Gathering merges more, and interpolates. */
-#define GATHER_BANDING_SHARE 0.18
+/* Gathering merges more, which is measured on curved surfaces (render_gather_cap_spacings), and
+ * interpolates. An environment takes its share of the first. */
+#define GATHER_BANDING_SHARE 0.28
 #define GATHER_INTERPOLATION_SHARE 0.1
 
 /* Caps of so many spacings keep the bands of splats under their share of epsilon = 0.01; for a tenth of
@@ -261,7 +262,8 @@ static void settle_medium(const struct render_request *request, struct render_pl
     const double decades = fmax(log10(CAP_EPSILON / plan->epsilon), 0);
     const double cap_spacings = is_gathered ? render_gather_cap_spacings(plan->banding_epsilon)
                                             : CAP_SPACINGS + CAP_SPACINGS_PER_DECADE * decades;
-    const double finest_mm = (is_gathered ? RENDER_GATHER_FINEST : 1) * planned->spacing_mm;
+    const double finest_mm =
+        (is_gathered ? render_gather_finest_spacings(plan->banding_epsilon) : 1) * planned->spacing_mm;
     /* What is captured is summed by others, from the finest samples alone; so are samples that are counted.
      */
     const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
@@ -292,7 +294,8 @@ void render_plan_settle_spacing(const struct render_request *request, struct ren
         return;
     const double texel_mm = render_plan_widest_spacing_mm(plan);
     if (plan->technique == RENDER_TECHNIQUE_GATHER) {
-        plan->banding_epsilon = GATHER_BANDING_SHARE * plan->epsilon;
+        const double share = GATHER_BANDING_SHARE - (plan->environment ? RENDER_ENVIRONMENT_SHARE : 0);
+        plan->banding_epsilon = share * plan->epsilon;
         plan->interpolation_epsilon = GATHER_INTERPOLATION_SHARE * plan->epsilon;
     }
     for (size_t m = 0; m < plan->media->count; m++)

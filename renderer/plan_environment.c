@@ -5,10 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Part of epsilon that orders left out may add, by their bound; of the third that is left for what has
- * none. */
-#define ENVIRONMENT_SHARE 0.1
-
 /* Texels of a peeled layer are so wide, as part of the spacing: patches as fine as those of triangles. */
 #define PEEL_SHARE 0.35
 
@@ -87,20 +83,21 @@ bool render_plan_light_from_around(const struct render_request *request, struct 
         const struct render_medium *const medium = &plan->media->media[m];
         if (!plan->of_medium[m].is_visible || !medium->has_scattering)
             continue;
-        if (!render_irradiance_create(plan->environment, medium->eta, ENVIRONMENT_SHARE * plan->epsilon,
-                                      &plan->irradiance[m], status))
+        if (!render_irradiance_create(plan->environment, medium->eta,
+                                      RENDER_ENVIRONMENT_SHARE * plan->epsilon, &plan->irradiance[m],
+                                      status))
             return false;
         plan->environment_error = fmax(plan->environment_error, plan->irradiance[m]->error);
         if (plan->irradiance[m]->order > plan->environment_order)
             plan->environment_order = plan->irradiance[m]->order;
     }
     plan->has_environment = true;
-    if (plan->environment_error > ENVIRONMENT_SHARE * plan->epsilon)
+    if (plan->environment_error > RENDER_ENVIRONMENT_SHARE * plan->epsilon)
         render_plan_add_note(
             plan,
             "the environment is drawn to order %d: what is above adds up to %.2g of its mean, "
             "%.2g were asked",
-            plan->environment_order, plan->environment_error, ENVIRONMENT_SHARE * plan->epsilon);
+            plan->environment_order, plan->environment_error, RENDER_ENVIRONMENT_SHARE * plan->epsilon);
     if (plan->has_specular)
         render_plan_add_note(plan, "gloss does not mirror the environment");
     if (render_plan_sums_samples(plan) && request->environment_samples != RENDER_ENVIRONMENT_SURFACE)

@@ -8,6 +8,9 @@
  * all views together: RENDER_LIGHT_SAMPLE_LIMIT texels, since each may become a sample. */
 enum { RENDER_VIEW_SIDE_LIMIT = 4096 };
 
+/* Part of epsilon that harmonics left out of an environment may add, by their bound. */
+#define RENDER_ENVIRONMENT_SHARE 0.1
+
 void render_plan_add_note(struct render_plan *plan, const char *format, ...) DIPOLE_PRINTF(2, 3);
 
 /* plan_environment.c: the environment that may be drawn; then, once the technique is known, its irradiance

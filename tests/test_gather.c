@@ -25,13 +25,14 @@ static double height_mm(double x_mm, double y_mm, double width_mm)
 
 /* width_mm: of the picture; a step in the middle, a tenth of it high; a border without objects. */
 static void scenery_init(struct scenery *scenery, const char *name, dipole_model model, double width_mm,
-                         double cap_spacings)
+                         double merging_error)
 {
     profile_init(&scenery->profile, name, model, 0.01);
     const struct test_profile *const profile = &scenery->profile;
     const double r_max_mm = fmin(profile->r_max_mm, 2 * width_mm);
-    scenery->band_count = render_bands_make(RENDER_GATHER_FINEST * profile->spacing_mm, r_max_mm,
-                                            cap_spacings, scenery->bands);
+    scenery->band_count =
+        render_bands_make(render_gather_finest_spacings(merging_error) * profile->spacing_mm, r_max_mm,
+                          render_gather_cap_spacings(merging_error), scenery->bands);
     assert_true(render_gather_medium_init(&profile->source, scenery->bands, scenery->band_count,
                                           &scenery->medium, NULL));
     const int side = (int)fmin(ceil(width_mm / profile->spacing_mm), 400);
@@ -139,8 +140,7 @@ static void kernels_follow_the_bands(void **state)
         struct render_band bands[RENDER_BAND_LIMIT];
         struct render_split split;
         profile_init(&profile, bundled[m], models[m % COUNT(models)], 0.01);
-        const int count =
-            render_bands_make(RENDER_GATHER_FINEST * profile.spacing_mm, profile.r_max_mm, 2, bands);
+        const int count = render_bands_make(0.7 * profile.spacing_mm, profile.r_max_mm, 2, bands);
         assert_true(render_split_init(&profile.source, bands, count, &split, NULL));
         bool has_core = false;
         for (int c = 0; c < 3; c++)
@@ -330,8 +330,8 @@ static void the_tree_misses_nothing(void **state)
 
 /* ---- pictures ----------------------------------------------------------------------------------- */
 
-/* Oracle: direct sums over all samples. Errors stay below those that the plan states (0.2 % of banding and
- * 0.17 % of interpolation at epsilon = 0.01, relative RMSE; three times that at the worst pixel), near
+/* Oracle: direct sums over all samples. Errors stay below those that the plan states (0.28 % of banding and
+ * 0.1 % of interpolation at epsilon = 0.01, relative RMSE; three times that at the worst pixel), near
  * steps, too. */
 static void sums_are_right(void **state)
 {
@@ -347,20 +347,79 @@ static void sums_are_right(void **state)
     for (size_t i = 0; i < COUNT(cases); i++) {
         struct scenery scenery;
         struct render_gather_counts counts;
-        scenery_init(&scenery, cases[i].name, cases[i].model, cases[i].width_mm,
-                     render_gather_cap_spacings(0.002));
-        float *const radiosity = gathered(&scenery, 0.0017, 0, &counts);
+        scenery_init(&scenery, cases[i].name, cases[i].model, cases[i].width_mm, 0.0028);
+        float *const radiosity = gathered(&scenery, 0.001, 0, &counts);
         const struct error error = error_of(&scenery, radiosity);
         print_message(
             "  %-10s %3g mm, %6zu samples, %d bands: rmse %.2e, max %.2e, bias %+.1e; %zu places, %zu "
             "refined, %zu sums\n",
             cases[i].name, cases[i].width_mm, scenery.sample_count, scenery.band_count, error.rmse,
             error.max, error.bias, counts.place_count, counts.refined_count, counts.evaluation_count);
-        assert_true(error.rmse < 0.0037);
-        assert_true(error.max < 3 * 0.0037);
+        assert_true(error.rmse < 0.0038);
+        assert_true(error.max < 3 * 0.0038);
         assert_true(fabs(error.bias) < 1e-3);
         free(radiosity);
         scenery_end(&scenery);
+    }
+}
+
+/* Turn all about the origin, by a random rotation: the cubes that samples are merged in cut the surface at
+ * all angles. */
+static void turn(struct scenery *scenery, struct rng *rng)
+{
+    double q[4], length2 = 0;
+    for (int k = 0; k < 4; k++) {
+        q[k] = uniform(rng, -1, 1);
+        length2 += q[k] * q[k];
+    }
+    const double s = 2 / length2, w = q[0], x = q[1], y = q[2], z = q[3];
+    const double rows[3][3] = { { 1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y) },
+                                { s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x) },
+                                { s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y) } };
+    for (size_t i = 0; i < scenery->sample_count + SIDE_PX * SIDE_PX; i++) {
+        float *const place = i < scenery->sample_count
+                                 ? scenery->samples[i].position_mm
+                                 : scenery->position_mm + 4 * (i - scenery->sample_count);
+        const double before[3] = { (double)place[0], (double)place[1], (double)place[2] };
+        for (int k = 0; k < 3; k++)
+            place[k] = (float)(rows[k][0] * before[0] + rows[k][1] * before[1] + rows[k][2] * before[2]);
+    }
+}
+
+static double spacing_of(const char *name)
+{
+    struct test_profile profile;
+    profile_init(&profile, name, DIPOLE_MODEL_DIPOLE, 0.01);
+    const double spacing_mm = profile.spacing_mm;
+    profile_end(&profile);
+    return spacing_mm;
+}
+
+/* Oracle: direct sums over all samples. What merging and cubics err by is what the plan says for caps so
+ * wide, whatever the material, however the surface lies in the cubes, and at the edges of light. */
+static void merging_errs_as_planned_at_any_angle(void **state)
+{
+    (void)state;
+    static const double errors[] = { 4.5e-3, 2.8e-3, 1.4e-3, 8.4e-4 };
+    struct rng rng = { .seed = 21 };
+    for (size_t m = 0; m < BUNDLED_COUNT; m++) {
+        for (size_t e = 0; e < COUNT(errors); e++) {
+            struct scenery scenery;
+            struct render_gather_counts counts;
+            const double width_mm = spacing_of(bundled[m]) * log_uniform(&rng, 20, 100);
+            scenery_init(&scenery, bundled[m], DIPOLE_MODEL_DIPOLE, width_mm, errors[e]);
+            turn(&scenery, &rng);
+            float *const radiosity = gathered(&scenery, 0, 0, &counts);
+            const struct error error = error_of(&scenery, radiosity);
+            print_message("  %-12s %4.1f mm, %6zu samples, caps of %.2f spacings: rmse %.2e of %.0e, max "
+                          "%.2e, bias %+.1e\n",
+                          bundled[m], width_mm, scenery.sample_count, render_gather_cap_spacings(errors[e]),
+                          error.rmse, errors[e], error.max, error.bias);
+            assert_true(error.rmse <= errors[e]);
+            assert_true(error.max <= 6 * errors[e]);
+            free(radiosity);
+            scenery_end(&scenery);
+        }
     }
 }
 
@@ -371,7 +430,7 @@ static void interpolation_follows_epsilon(void **state)
     static const double epsilons[] = { 0.01, 0.001, 0 };
     struct scenery scenery;
     size_t before = 0;
-    scenery_init(&scenery, "wholemilk", DIPOLE_MODEL_DIPOLE, 10, 2);
+    scenery_init(&scenery, "wholemilk", DIPOLE_MODEL_DIPOLE, 10, 0.003);
     for (size_t i = 0; i < COUNT(epsilons); i++) {
         struct render_gather_counts counts;
         float *const radiosity = gathered(&scenery, epsilons[i], 1, &counts);
@@ -391,7 +450,7 @@ static void threads_change_nothing(void **state)
 {
     (void)state;
     struct scenery scenery;
-    scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 2);
+    scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 0.003);
     float *const one = gathered(&scenery, 0.002, 1, NULL), *const four = gathered(&scenery, 0.002, 4, NULL);
     assert_memory_equal(one, four, SIDE_PX * SIDE_PX * 4 * sizeof *one);
     free(one);
@@ -405,7 +464,7 @@ static void light_stays_in_its_object(void **state)
     (void)state;
     struct scenery scenery;
     struct render_gather_sources lit, dark;
-    scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 2);
+    scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 0.003);
     assert_true(render_gather_sources_init(scenery.samples, scenery.sample_count, scenery.bands,
                                            scenery.band_count, &lit, NULL));
     assert_true(render_gather_sources_init(NULL, 0, scenery.bands, scenery.band_count, &dark, NULL));
@@ -440,10 +499,15 @@ static void light_stays_in_its_object(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kernels_follow_the_bands), cmocka_unit_test(loops_agree),
-        cmocka_unit_test(merging_keeps_moments),    cmocka_unit_test(the_tree_misses_nothing),
-        cmocka_unit_test(sums_are_right),           cmocka_unit_test(interpolation_follows_epsilon),
-        cmocka_unit_test(threads_change_nothing),   cmocka_unit_test(light_stays_in_its_object),
+        cmocka_unit_test(kernels_follow_the_bands),
+        cmocka_unit_test(loops_agree),
+        cmocka_unit_test(merging_keeps_moments),
+        cmocka_unit_test(the_tree_misses_nothing),
+        cmocka_unit_test(sums_are_right),
+        cmocka_unit_test(merging_errs_as_planned_at_any_angle),
+        cmocka_unit_test(interpolation_follows_epsilon),
+        cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(light_stays_in_its_object),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
