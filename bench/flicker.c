@@ -13,6 +13,7 @@
  * and samples. PLOT_TECHNIQUE_EPSILON.svg shows flicker by frame.
  */
 #include "io/file.h"
+#include "lutgen/parallel.h"
 #include "plot/plot.h"
 #include "renderer/gather.h"
 #include "renderer/plan.h"
@@ -52,53 +53,86 @@ static void point_at(const struct io_scene *scene, int index, double position_mm
         position_mm[k] = (double)mesh->positions[3 * vertex + k];
 }
 
-/* One band of a split profile, of samples that are splatted. */
-static double sum_band(const struct render_light_samples *samples, const struct render_split *split,
-                       int band, const double position_mm[3])
+/* What splats sum at all points: the tables of their bands (common/profile.glsl), grey, in double. */
+struct splat_sums {
+    const struct bench *bench;
+    const struct render_plan_medium *planned;
+    size_t medium;
+    struct lut_axis axis;
+    float *rgb; /* nodes of all bands */
+    double inverse_scale2, nodes_per_log2;
+    double *radiosity;
+};
+
+static double sum_band(const struct splat_sums *sums, int band, const double position_mm[3])
 {
+    const struct render_light_samples *const samples =
+        render_splatter_band(render_executor_splatter(sums->bench->renderer->executor), sums->medium, band);
+    const float(*const nodes)[4] =
+        (const float(*)[4])(sums->rgb) + (size_t)band * (size_t)sums->axis.node_count;
+    const double reach_mm = sums->planned->bands[band].r_outer_mm;
     double sum = 0;
-    const double reach_mm = split->bands[band].r_outer_mm;
     for (size_t i = 0; i < samples->count; i++) {
         const struct render_light_sample *const s = &samples->samples[i];
-        double distance2 = 0, rgb[IO_CHANNEL_COUNT];
+        double distance2 = 0;
         for (int k = 0; k < 3; k++) {
             const double step = position_mm[k] - (double)s->position_mm[k];
             distance2 += step * step;
         }
         if (distance2 >= reach_mm * reach_mm || s->object != 0)
             continue;
-        render_split_band_per_mm2(split, band, sqrt(distance2), rgb);
+        const double place = fmin(log2(1 + distance2 * sums->inverse_scale2) * sums->nodes_per_log2,
+                                  sums->axis.node_count - 1.001);
+        const int node = (int)place;
         for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            sum += rgb[c] * (double)s->flux_w[c] / IO_CHANNEL_COUNT;
+            sum += ((double)nodes[node][c] +
+                    (place - node) * ((double)nodes[node + 1][c] - (double)nodes[node][c])) *
+                   (double)s->flux_w[c] / IO_CHANNEL_COUNT;
     }
     return sum;
 }
 
-static bool sum_splats(const struct bench *bench, const struct render_band_source *source, size_t medium,
-                       const struct render_plan_medium *planned, double radiosity[POINTS],
+static void sum_splats_at(void *context, int index)
+{
+    const struct splat_sums *const sums = context;
+    double position_mm[3], sum = 0;
+    point_at(sums->bench->scene, index, position_mm);
+    for (int b = 0; b < sums->planned->band_count; b++)
+        sum += sum_band(sums, b, position_mm);
+    sums->radiosity[index] = sum;
+}
+
+static bool sum_splats(const struct bench *bench, const struct render_plan *plan,
+                       const struct render_band_source *source, size_t medium, double radiosity[POINTS],
                        dipole_status *status)
 {
-    const struct render_splatter *const splatter = render_executor_splatter(bench->renderer->executor);
-    struct render_split split;
-    const bool done = render_split_init(source, planned->bands, planned->band_count, &split, status);
-    for (int i = 0; done && i < POINTS; i++) {
-        double position_mm[3];
-        point_at(bench->scene, i, position_mm);
-        radiosity[i] = 0;
-        for (int b = 0; b < planned->band_count; b++)
-            radiosity[i] += sum_band(render_splatter_band(splatter, medium, b), &split, b, position_mm);
-    }
-    render_split_end(&split);
+    struct splat_sums sums = { .bench = bench,
+                               .planned = &plan->of_medium[medium],
+                               .medium = medium,
+                               .axis = render_bands_axis(source) };
+    const double end = sums.axis.r_max_mm / sums.axis.scale_mm;
+    sums.inverse_scale2 = 1 / (sums.axis.scale_mm * sums.axis.scale_mm);
+    sums.nodes_per_log2 = (sums.axis.node_count - 1) / log2(1 + end * end);
+    sums.rgb =
+        calloc((size_t)sums.planned->band_count * (size_t)sums.axis.node_count, 4 * sizeof *sums.rgb);
+    sums.radiosity = radiosity;
+    const bool done = sums.rgb ? render_bands_bake(source, sums.planned->bands, sums.planned->band_count,
+                                                   sums.rgb, status)
+                               : dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for profiles");
+    if (done)
+        lut_parallel_for(POINTS, 0, sum_splats_at, &sums);
+    free(sums.rgb);
     return done;
 }
 
 /* The points as a picture of one row; so far apart that nothing is interpolated between them. */
 #define FAR_APART_MM 1e6
 
-static bool sum_gathered(const struct bench *bench, const struct render_band_source *source, size_t medium,
-                         const struct render_plan_medium *planned, double radiosity[POINTS],
+static bool sum_gathered(const struct bench *bench, const struct render_plan *plan,
+                         const struct render_band_source *source, size_t medium, double radiosity[POINTS],
                          dipole_status *status)
 {
+    const struct render_plan_medium *const planned = &plan->of_medium[medium];
     const struct render_light_samples *const samples =
         render_splatter_samples(render_executor_splatter(bench->renderer->executor), medium);
     static struct render_gather_medium kernels;
@@ -122,8 +156,10 @@ static bool sum_gathered(const struct bench *bench, const struct render_band_sou
     }
     const bool done =
         render_gather_medium_init(source, planned->bands, planned->band_count, &kernels, status) &&
-        render_gather_sources_init(samples->samples, samples->count, planned->bands, planned->band_count,
-                                   &sources, status) &&
+        render_gather_sources_init(samples->samples,
+                                   plan->coherence == RENDER_COHERENCE_SURFACE ? samples->codes : NULL,
+                                   render_plan_code_level(plan, 0), samples->count, planned->bands,
+                                   planned->band_count, &sources, status) &&
         render_gather_run(&request, rgb[0], NULL, status);
     render_gather_sources_end(&sources);
     for (int i = 0; done && i < POINTS; i++)
@@ -143,7 +179,7 @@ static bool sum_points(const struct bench *bench, const struct render_plan *plan
                                          .medium = &plan->media->media[medium] };
     memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
     return (plan->technique == RENDER_TECHNIQUE_GATHER ? sum_gathered : sum_splats)(
-        bench, &source, medium, planned, radiosity, status);
+        bench, plan, &source, medium, radiosity, status);
 }
 
 static bool run(struct bench *bench, enum render_technique technique, enum render_coherence coherence,

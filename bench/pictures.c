@@ -5,6 +5,11 @@
  * Markdown cells in %, within objects, then with their edges: relative RMSE, Weber's 99th percentile, and
  * that of values above 1e-4 of the brightest.
  *
+ * usage: bench_pictures brief REFERENCE.exr PICTURE.exr
+ *
+ * Two numbers in %, within objects: relative RMSE, and the largest error of a pixel's channel over the root
+ * mean square of the reference.
+ *
  * usage: bench_pictures difference REFERENCE.exr PICTURE.exr OUT.ppm
  *
  * Signed: red is too bright, blue too dark, full colour at 10 % of the brightest.
@@ -92,6 +97,28 @@ static bool print_errors(const struct io_image *reference, const struct io_image
     return true;
 }
 
+static bool print_brief(const struct io_image *reference, const struct io_image *picture)
+{
+    const size_t pixel_count = (size_t)reference->width_px * (size_t)reference->height_px;
+    double error2 = 0, value2 = 0, largest2 = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < pixel_count; i++) {
+        if (!is_within(reference, (int)(i % (size_t)reference->width_px),
+                       (int)(i / (size_t)reference->width_px)))
+            continue;
+        for (size_t c = 0; c < 3; c++) {
+            const double expected = (double)reference->pixels[4 * i + c];
+            const double error = (double)picture->pixels[4 * i + c] - expected;
+            error2 += error * error;
+            value2 += expected * expected;
+            largest2 = fmax(largest2, error * error);
+            count++;
+        }
+    }
+    printf("%.2f %.2f\n", 100 * sqrt(error2 / value2), 100 * sqrt(largest2 / value2 * (double)count));
+    return true;
+}
+
 static bool write_difference(const struct io_image *reference, const struct io_image *picture,
                              const char *path)
 {
@@ -119,15 +146,19 @@ int main(int argc, char **argv)
     struct io_image *reference = NULL, *picture = NULL;
     dipole_status status = { 0 };
     if (argc < 4) {
-        fputs("usage: bench_pictures errors|difference REFERENCE.exr PICTURE.exr [OUT.ppm]\n", stderr);
+        fputs("usage: bench_pictures errors|brief|difference REFERENCE.exr PICTURE.exr [OUT.ppm]\n",
+              stderr);
         return 2;
     }
     bool done = io_exr_read(argv[2], &reference, &status) && io_exr_read(argv[3], &picture, &status);
     if (done && (reference->width_px != picture->width_px || reference->height_px != picture->height_px))
         done = dipole_fail(&status, DIPOLE_BAD_VALUE, NULL, "the pictures are of different sizes");
-    if (done)
-        done = strcmp(argv[1], "errors") == 0 ? print_errors(reference, picture)
-                                              : argc > 4 && write_difference(reference, picture, argv[4]);
+    if (done && strcmp(argv[1], "errors") == 0)
+        done = print_errors(reference, picture);
+    else if (done && strcmp(argv[1], "brief") == 0)
+        done = print_brief(reference, picture);
+    else if (done)
+        done = argc > 4 && write_difference(reference, picture, argv[4]);
     if (!done)
         fprintf(stderr, "bench_pictures: %s\n", status.message);
     io_image_destroy(reference);

@@ -38,6 +38,7 @@ enum io_primitive {
     IO_PRIMITIVE_KNOT,       /* trefoil tube within about -1..1                      */
     IO_PRIMITIVE_BOWL,       /* hollow hemisphere of thickness 0.1, open upwards     */
     IO_PRIMITIVE_TERRAIN,    /* height field with thin fins, x and z in -1..1        */
+    IO_PRIMITIVE_LANTERN,    /* ball of radius 1 with 12 flutes, hollow: a ball of 0.8 within is air */
     IO_PRIMITIVE_COUNT,
 };
 extern const char *const io_primitive_names[IO_PRIMITIVE_COUNT];

@@ -7,9 +7,9 @@
 static const double PI = 3.14159265358979323846;
 
 const char *const io_primitive_names[IO_PRIMITIVE_COUNT] = {
-    [IO_PRIMITIVE_SPHERE] = "sphere",   [IO_PRIMITIVE_CUBE] = "cube", [IO_PRIMITIVE_SLAB] = "slab",
-    [IO_PRIMITIVE_TORUS] = "torus",     [IO_PRIMITIVE_KNOT] = "knot", [IO_PRIMITIVE_BOWL] = "bowl",
-    [IO_PRIMITIVE_TERRAIN] = "terrain",
+    [IO_PRIMITIVE_SPHERE] = "sphere",   [IO_PRIMITIVE_CUBE] = "cube",       [IO_PRIMITIVE_SLAB] = "slab",
+    [IO_PRIMITIVE_TORUS] = "torus",     [IO_PRIMITIVE_KNOT] = "knot",       [IO_PRIMITIVE_BOWL] = "bowl",
+    [IO_PRIMITIVE_TERRAIN] = "terrain", [IO_PRIMITIVE_LANTERN] = "lantern",
 };
 
 enum { DETAIL_MIN = 4, DETAIL_MAX = 4096 };
@@ -449,6 +449,78 @@ static bool create_terrain(int detail, struct io_mesh **mesh_out, dipole_status 
     return true;
 }
 
+/* ---- lantern ------------------------------------------------------------------------------------- */
+
+/*
+ * A closed surface about the origin at the distance r = scale (1 - depth sin^2 a (1 - cos(count b))/2), a
+ * the angle from the axis y, b that about it: a ball with flutes that run out at the poles. Its outward
+ * normal is along the gradient of |p| - r, which has no pole: dr/db holds the square of the sine that it is
+ * divided by.
+ */
+struct fluted_ball {
+    double scale, depth, count;
+    bool is_cavity; /* the solid is outside: normals and triangles face the origin */
+};
+
+static void add_fluted_point(struct builder *builder, const struct fluted_ball *ball, double a, double b)
+{
+    const double sa = sin(a), ca = cos(a), sb = sin(b), cb = cos(b), wave = (1 - cos(ball->count * b)) / 2;
+    const double r = ball->scale * (1 - ball->depth * sa * sa * wave);
+    const double along = ball->scale * ball->depth * 2 * sa * ca * wave / r;
+    const double about = ball->scale * ball->depth * sa * ball->count / 2 * sin(ball->count * b) / r;
+    const struct vector out = { sa * cb, ca, -sa * sb };
+    const struct vector n = unit((struct vector){ out.x + along * ca * cb - about * sb, out.y - along * sa,
+                                                  out.z - along * ca * sb - about * cb });
+    const double sign = ball->is_cavity ? -1 : 1;
+    add_vertex(builder, (struct vector){ r * out.x, r * out.y, r * out.z },
+               (struct vector){ sign * n.x, sign * n.y, sign * n.z });
+}
+
+/* A triangle of a surface seen from the origin's other side, or the same turned over. */
+static void add_facing(struct builder *builder, bool is_cavity, size_t a, size_t b, size_t c)
+{
+    add_triangle(builder, a, is_cavity ? c : b, is_cavity ? b : c);
+}
+
+/* Rings of turn_count points from the upper pole down, then the two poles. */
+static void add_fluted_ball(struct builder *builder, const struct fluted_ball *ball, size_t ring_count,
+                            size_t turn_count)
+{
+    const size_t first = builder->vertex_count, poles = first + ring_count * turn_count;
+    const size_t last = poles - turn_count;
+    for (size_t i = 1; i <= ring_count; i++)
+        for (size_t j = 0; j < turn_count; j++)
+            add_fluted_point(builder, ball, PI * (double)i / (double)(ring_count + 1),
+                             2 * PI * (double)j / (double)turn_count);
+    add_fluted_point(builder, ball, 0, 0);
+    add_fluted_point(builder, ball, PI, 0);
+    for (size_t j = 0; j < turn_count; j++) {
+        const size_t next = (j + 1) % turn_count;
+        add_facing(builder, ball->is_cavity, poles, first + j, first + next);
+        add_facing(builder, ball->is_cavity, poles + 1, last + next, last + j);
+        for (size_t i = 0; i + 1 < ring_count; i++) {
+            const size_t upper = first + i * turn_count, lower = upper + turn_count;
+            add_facing(builder, ball->is_cavity, upper + j, lower + j, lower + next);
+            add_facing(builder, ball->is_cavity, upper + j, lower + next, upper + next);
+        }
+    }
+}
+
+/* The wall is 0.2 thick on the ribs and 0.08 in the flutes. */
+static bool create_lantern(int detail, struct io_mesh **mesh_out, dipole_status *status)
+{
+    const struct fluted_ball outside = { .scale = 1, .depth = 0.12, .count = 12 };
+    const struct fluted_ball cavity = { .scale = 0.8, .is_cavity = true };
+    const size_t turns = (size_t)detail, rings = share_of(detail, 0.5, 2) - 1;
+    struct builder builder;
+    if (!start(&builder, 2 * (rings * turns + 2), 4 * rings * turns, status))
+        return false;
+    add_fluted_ball(&builder, &outside, rings, turns);
+    add_fluted_ball(&builder, &cavity, rings, turns);
+    *mesh_out = finish(&builder);
+    return true;
+}
+
 /* ---- the list ------------------------------------------------------------------------------------ */
 
 bool io_mesh_create_primitive(enum io_primitive primitive, int detail, struct io_mesh **mesh_out,
@@ -458,7 +530,7 @@ bool io_mesh_create_primitive(enum io_primitive primitive, int detail, struct io
         [IO_PRIMITIVE_SPHERE] = create_sphere,   [IO_PRIMITIVE_CUBE] = create_cube,
         [IO_PRIMITIVE_SLAB] = create_slab,       [IO_PRIMITIVE_TORUS] = create_torus,
         [IO_PRIMITIVE_KNOT] = create_knot,       [IO_PRIMITIVE_BOWL] = create_bowl,
-        [IO_PRIMITIVE_TERRAIN] = create_terrain,
+        [IO_PRIMITIVE_TERRAIN] = create_terrain, [IO_PRIMITIVE_LANTERN] = create_lantern,
     };
     *mesh_out = NULL;
     if (detail < DETAIL_MIN || detail > DETAIL_MAX)

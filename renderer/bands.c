@@ -44,10 +44,12 @@ bool render_band_keys_are_same(const struct render_band_key *a, const struct ren
 static void whole_profile(const struct render_split *split, double r_mm, double rgb[IO_CHANNEL_COUNT])
 {
     const struct render_band_source *const source = &split->source;
-    /* The last node may round to beyond the axis, where the table is 0. */
+    /* The last node may round to beyond the axis, where the table is 0. Footprints may be wider than it. */
     const double r_max_mm = source->table->rows[source->row].axis.r_max_mm;
+    const bool is_beyond = r_mm > r_max_mm * (1 + 1e-9);
     lut_splat_sample(source->table, source->row, fmin(r_mm, r_max_mm), rgb);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        rgb[c] = is_beyond ? 0 : rgb[c];
         if (split->blurred[c] && r_mm <= split->blurred[c]->reach_mm)
             rgb[c] = render_footprint_sample(split->blurred[c], r_mm);
     }
@@ -56,9 +58,11 @@ static void whole_profile(const struct render_split *split, double r_mm, double 
 /*
  * Taylor's polynomial of a channel in 1 - s/s_cap, s the distance squared: of the polynomial through
  * CAP_NODES Chebyshev nodes about the cap. The profile is completely monotonic in s, so all terms are
- * positive, and caps rise inwards, below the profile.
+ * positive, and caps rise inwards, below the profile. One that is blurred (not NULL) has lobes: there it is
+ * the polynomial, whatever its signs.
  */
-static void fit_cap(const dipole_stack *stack, double cap_mm, double terms[RENDER_CAP_TERMS])
+static void fit_cap(const dipole_stack *stack, const struct render_footprint *blurred, double cap_mm,
+                    double terms[RENDER_CAP_TERMS])
 {
     enum { CAP_NODES = 7 };
     const double half_width = 0.25; /* in s/s_cap */
@@ -67,7 +71,12 @@ static void fit_cap(const dipole_stack *stack, double cap_mm, double terms[RENDE
         x[i] = half_width * cos(PI * (i + 0.5) / CAP_NODES);
         r_mm[i] = cap_mm * sqrt(1 - x[i]);
     }
-    dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, r_mm, CAP_NODES, divided);
+    if (blurred) {
+        for (int i = 0; i < CAP_NODES; i++)
+            divided[i] = render_footprint_exact_per_mm2(blurred, r_mm[i]);
+    } else {
+        dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, r_mm, CAP_NODES, divided);
+    }
     for (int order = 1; order < CAP_NODES; order++) { /* Newton's form */
         for (int i = CAP_NODES - 1; i >= order; i--)
             divided[i] = (divided[i] - divided[i - 1]) / (x[i] - x[i - order]);
@@ -79,8 +88,11 @@ static void fit_cap(const dipole_stack *stack, double cap_mm, double terms[RENDE
         power[0] = divided[i] - x[i] * power[0];
     }
     for (int k = 0; k < RENDER_CAP_TERMS; k++)
-        terms[k] = fmax(power[k], 0);
+        terms[k] = blurred ? power[k] : fmax(power[k], 0);
 }
+
+/* Caps nearer than so many steps of a footprint (12 times its blur) are of the blurred profile. */
+enum { NEAR_FOOTPRINT = 96 };
 
 /* All caps, scaled to meet the table. */
 static void fit_caps(struct render_split *split)
@@ -90,9 +102,15 @@ static void fit_caps(struct render_split *split)
         whole_profile(split, split->bands[b].cap_mm, at_cap);
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
             double *const terms = split->caps[b][c];
-            if (!(at_cap[c] > 0))
+            const struct render_footprint *const blurred = split->blurred[c];
+            if (at_cap[c] == 0)
                 continue;
-            fit_cap(split->source.medium->stacks[c], split->bands[b].cap_mm, terms);
+            if (blurred && split->bands[b].cap_mm < NEAR_FOOTPRINT * blurred->step_mm) {
+                fit_cap(NULL, blurred, split->bands[b].cap_mm, terms);
+                terms[0] = at_cap[c];
+                continue;
+            }
+            fit_cap(split->source.medium->stacks[c], NULL, split->bands[b].cap_mm, terms);
             const double scale = terms[0] > 0 ? at_cap[c] / terms[0] : 0;
             for (int k = 0; k < RENDER_CAP_TERMS; k++)
                 terms[k] *= scale;
@@ -176,6 +194,8 @@ struct lut_axis render_bands_axis(const struct render_band_source *source)
     struct lut_axis axis = source->table->rows[source->row].axis;
     axis.power = 0;
     axis.node_count = RENDER_BAND_NODES;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        axis.r_max_mm = fmax(axis.r_max_mm, RENDER_FOOTPRINT_REACH * source->blur_mm[c]);
     return axis;
 }
 

@@ -16,17 +16,20 @@
 #define RENDER_COST_LEVELS_MS 60.0
 
 /* Nanoseconds each. */
-#define RENDER_COST_TRIANGLE 90.0         /* drawn once, whatever it covers               */
-#define RENDER_COST_TRIANGLE_4 170.0      /* the same, where pixels have four points      */
-#define RENDER_COST_EMPTY_PIXEL 12.0      /* cleared and looked at                        */
-#define RENDER_COST_SURFACE_PIXEL 80.0    /* covered: four points found, one resolved     */
-#define RENDER_COST_VIEW_TEXEL 17.0       /* of a light's view, cleared and drawn         */
-#define RENDER_COST_READ_TEXEL 25.0       /* of the view, read back and put into samples  */
+#define RENDER_COST_TRIANGLE 90.0      /* drawn once, whatever it covers               */
+#define RENDER_COST_TRIANGLE_4 170.0   /* the same, where pixels have four points      */
+#define RENDER_COST_EMPTY_PIXEL 12.0   /* cleared and looked at                        */
+#define RENDER_COST_SURFACE_PIXEL 80.0 /* covered: four points found, one resolved     */
+#define RENDER_COST_VIEW_TEXEL 17.0    /* of a light's view, cleared and drawn         */
+#define RENDER_COST_READ_TEXEL 25.0    /* of the view, read back and put into samples  */
+#define RENDER_COST_PICTURE_TEXEL 12.0 /* of one drawn in memory, and the same    */
+#define RENDER_COST_PICTURE_TRIANGLE 30.0
 #define RENDER_COST_SHADOW_PIXEL 100.0    /* covered, lit and shaded at one point         */
 #define RENDER_COST_GLOSS_PIXEL 260.0     /* the same, some at four                       */
 #define RENDER_COST_COMPOSITE_PIXEL 45.0  /* covered                                      */
 #define RENDER_COST_SPLAT_EVALUATION 2.8  /* one sample at one pixel                      */
-#define RENDER_COST_GATHER_EVALUATION 1.4 /* one merged sample at one place, its list included  */
+#define RENDER_COST_SPLAT_FRAGMENT 12.0   /* one pixel of a splat of one sample    */
+#define RENDER_COST_GATHER_EVALUATION 0.7 /* one sample at one place, if slopes spared none */
 #define RENDER_COST_GATHER_PIXEL 60.0     /* interpolated                                 */
 #define RENDER_COST_GATHER_SAMPLE 70.0    /* ordered and merged                           */
 #define RENDER_COST_GATHER_PLACE 100.0    /* read back, its tile's lists made     */
@@ -116,6 +119,13 @@ static inline double render_cost_splat_evaluations(const struct render_plan *pla
         }
     }
     return count;
+}
+
+static inline double render_cost_splats_ms(const struct render_plan *plan)
+{
+    return plan->has_grid
+               ? render_cost_ms(RENDER_COST_SPLAT_FRAGMENT, render_plan_grid_fragments(plan))
+               : render_cost_ms(RENDER_COST_SPLAT_EVALUATION, render_cost_splat_evaluations(plan));
 }
 
 /* Samples of the environment's light: of all the surface, four to a square as wide as the spacing. */

@@ -87,7 +87,7 @@ static double roughness_of(const struct io_object *object)
 /* Locations 0: position_mm, 1: normal, 2: position at rest. */
 static void bind_vertices(GLuint vertex_array, GLuint location, GLuint buffer, GLintptr offset)
 {
-    glVertexArrayVertexBuffer(vertex_array, location, buffer, offset, 3 * sizeof(float));
+    glVertexArrayVertexBuffer(vertex_array, location, buffer, offset, RENDER_VERTEX_FLOATS * sizeof(float));
     glVertexArrayAttribFormat(vertex_array, location, 3, GL_FLOAT, GL_FALSE, 0);
     glVertexArrayAttribBinding(vertex_array, location, location);
     glEnableVertexArrayAttrib(vertex_array, location);
@@ -97,7 +97,7 @@ static void mesh_create(struct mesh *mesh, const struct io_object *object,
                         const struct render_geometry *geometry)
 {
     const struct io_mesh *const source = mesh->source;
-    const GLintptr offset = (GLintptr)(mesh->posed.first_vertex * 3 * sizeof(float));
+    const GLintptr offset = (GLintptr)(mesh->posed.first_vertex * RENDER_VERTEX_FLOATS * sizeof(float));
     glCreateVertexArrays(1, &mesh->vertex_array);
     for (GLuint i = 0; i < RENDER_VERTEX_ARRAYS; i++)
         bind_vertices(mesh->vertex_array, i, geometry->vertices[i].buffer, offset);
@@ -706,6 +706,13 @@ static bool is_seen_from_outside(const struct render_frame *frame, size_t object
     return view->is_orthographic || distance2 > ball->radius_mm * ball->radius_mm;
 }
 
+bool render_executor_hides_inside(const struct render_frame *frame, size_t object)
+{
+    return frame->executor->meshes[object].is_solid &&
+           render_pose_keeps_sides(&frame->request->scene->objects[object]) &&
+           is_seen_from_outside(frame, object);
+}
+
 static bool draw(const struct render_frame *frame, const struct render_pass *pass, dipole_status *status)
 {
     if (pass->draw == RENDER_DRAW_BY_RUN)
@@ -715,10 +722,7 @@ static bool draw(const struct render_frame *frame, const struct render_pass *pas
         return true;
     }
     for (size_t i = 0; i < frame->executor->mesh_count; i++) {
-        const bool is_inside_hidden = frame->executor->meshes[i].is_solid &&
-                                      render_pose_keeps_sides(&frame->request->scene->objects[i]) &&
-                                      is_seen_from_outside(frame, i);
-        (is_inside_hidden ? glEnable : glDisable)(GL_CULL_FACE);
+        (render_executor_hides_inside(frame, i) ? glEnable : glDisable)(GL_CULL_FACE);
         render_draw_object(frame, i);
     }
     glDisable(GL_CULL_FACE);
@@ -762,6 +766,19 @@ static bool run_pass(struct render_frame *frame, const struct render_pass *pass,
     return done && render_gl_check(executor->errors, pass->name, status);
 }
 
+/* Programs are made before any pass is timed. */
+static bool prepare_programs(struct render_executor *executor, const struct render_plan *plan,
+                             dipole_status *status)
+{
+    bool done = true;
+    for (size_t i = 0; done && i < plan->pass_count; i++) {
+        const struct render_pass *const pass = plan->passes[i].pass;
+        GLuint program;
+        done = pass->draw == RENDER_DRAW_NOTHING || program_for(executor, plan, pass, &program, status);
+    }
+    return done;
+}
+
 bool render_executor_run(struct render_executor *executor, const struct render_request *request,
                          const struct render_plan *plan, const struct render_table *tables,
                          const struct lut_tsm *const *volumes, double time_ms[RENDER_EFFECT_LIMIT],
@@ -775,7 +792,7 @@ bool render_executor_run(struct render_executor *executor, const struct render_r
         render_splatter_begin(executor->splatter);
     if (!prepare_textures(executor, plan, status))
         return false;
-    bool done = true;
+    bool done = prepare_programs(executor, plan, status);
     for (size_t i = 0; done && i < plan->pass_count; i++) {
         const struct render_plan_pass *const row = &plan->passes[i];
         struct render_frame frame = { .executor = executor,

@@ -72,6 +72,9 @@ void render_executor_find_points(const struct render_frame *frame);
 void render_set_points(const struct render_frame *frame);
 
 /* Say that a draw call was made. Functions that draw by themselves call it. */
+/* Whether no triangle of an object is seen from behind, by the camera or the frame's light. */
+bool render_executor_hides_inside(const struct render_frame *frame, size_t object);
+
 void render_count_draw(const struct render_frame *frame);
 
 /* Draw one object, or a triangle over the whole target. */

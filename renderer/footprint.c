@@ -120,38 +120,44 @@ double render_footprint_kernel_per_mm2(double blur_mm, double r_mm, double s_mm)
     return kernel_over_ring(r_mm / blur_mm, s_mm / blur_mm) / (blur_mm * blur_mm);
 }
 
+double render_footprint_exact_per_mm2(const struct render_footprint *footprint, double r_mm)
+{
+    const int near = (int)(r_mm / footprint->step_mm);
+    const int first = near > KERNEL * STEPS ? near - KERNEL * STEPS : 0;
+    const int last =
+        near + KERNEL * STEPS < footprint->ring_count ? near + KERNEL * STEPS : footprint->ring_count - 1;
+    const double blur_mm = footprint->step_mm * STEPS;
+    double sum = 0;
+    for (int i = first; i <= last; i++)
+        sum += footprint->power[i] * kernel_over_ring(r_mm / blur_mm, (double)i / STEPS);
+    return sum / (blur_mm * blur_mm);
+}
+
 bool render_footprint_create(const dipole_stack *stack, double blur_mm,
                              struct render_footprint **footprint_out, dipole_status *status)
 {
     const int count = REACH * STEPS + 2, ring_count = (REACH + KERNEL) * STEPS + 1;
     struct render_footprint *const footprint =
-        malloc(sizeof *footprint + (size_t)count * sizeof *footprint->values_per_mm2);
-    double *const power = malloc((size_t)ring_count * sizeof *power);
+        malloc(sizeof *footprint + (size_t)(count + ring_count) * sizeof *footprint->values_per_mm2);
     *footprint_out = NULL;
-    if (!footprint || !power) {
-        free(footprint);
-        free(power);
+    if (!footprint)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a profile of %d nodes",
                            count);
-    }
     const double step_mm = blur_mm / STEPS;
+    double *const power = footprint->values_per_mm2 + count;
     double within = 0;
     for (int i = 0; i < ring_count; i++) { /* the rings about i steps; the first is a disc */
         const double next = dipole_stack_within(stack, DIPOLE_FACE_LIT, (i + 0.5) * step_mm);
         power[i] = fmax(next - within, 0);
         within = next;
     }
-    *footprint =
-        (struct render_footprint){ .step_mm = step_mm, .reach_mm = (count - 2) * step_mm, .count = count };
-    for (int node = 0; node < count; node++) {
-        const int first = node > KERNEL * STEPS ? node - KERNEL * STEPS : 0;
-        const int last = node + KERNEL * STEPS < ring_count ? node + KERNEL * STEPS : ring_count - 1;
-        double sum = 0;
-        for (int i = first; i <= last; i++)
-            sum += power[i] * kernel_over_ring((double)node / STEPS, (double)i / STEPS);
-        footprint->values_per_mm2[node] = sum / (blur_mm * blur_mm);
-    }
-    free(power);
+    *footprint = (struct render_footprint){ .step_mm = step_mm,
+                                            .reach_mm = (count - 2) * step_mm,
+                                            .count = count,
+                                            .ring_count = ring_count,
+                                            .power = power };
+    for (int node = 0; node < count; node++)
+        footprint->values_per_mm2[node] = render_footprint_exact_per_mm2(footprint, node * step_mm);
     *footprint_out = footprint;
     return true;
 }

@@ -22,19 +22,24 @@ double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, do
  */
 double render_footprint_error(const dipole_stack *stack, double blur_mm);
 
+/* Beyond so many times the blur lies less than 2e-6 of what is averaged: e^(-r^2/(6 b^2)). */
+#define RENDER_FOOTPRINT_REACH 9
+
 /* The spacing at which aliasing and error of the blur are epsilon each; not less than least_mm. */
 double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm);
 
 /* Blurred profile of the lit face, tabulated out to reach_mm. One allocation; end it with free. */
 struct render_footprint {
     double step_mm, reach_mm;
-    int count;
-    double values_per_mm2[];
+    int count, ring_count;
+    double *power;           /* of rings about the steps */
+    double values_per_mm2[]; /* at the steps             */
 };
 DIPOLE_CHECKED bool render_footprint_create(const dipole_stack *stack, double blur_mm,
                                             struct render_footprint **footprint_out, dipole_status *status);
 
-/* 0 <= r_mm <= reach_mm */
+/* 0 <= r_mm <= reach_mm; the second is the average itself, not interpolated. */
 double render_footprint_sample(const struct render_footprint *footprint, double r_mm);
+double render_footprint_exact_per_mm2(const struct render_footprint *footprint, double r_mm);
 
 #endif

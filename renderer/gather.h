@@ -30,6 +30,8 @@ struct render_gather_medium {
     /* The same, over the radiosity itself: as no sample's share changes by more, so does none of their sum.
      */
     double own_slope_per_mm[RENDER_BAND_LIMIT], own_bend_per_mm2[RENDER_BAND_LIMIT];
+    /* Third derivatives, of both kinds. */
+    double third_per_mm3[RENDER_BAND_LIMIT], own_third_per_mm3[RENDER_BAND_LIMIT];
 };
 
 DIPOLE_CHECKED bool render_gather_medium_init(const struct render_band_source *source,
@@ -50,6 +52,7 @@ struct render_gather_request {
     double epsilon;      /* what interpolation may err by, of what a lit flat surface sends out */
     double own_epsilon;  /* and of what is there                                                */
     int thread_count;    /* 0: as many as processors; sums do not depend on it */
+    bool has_slopes;     /* nodes know their slopes, and may lie farther apart (theory.md T43) */
 };
 
 struct render_gather_counts {

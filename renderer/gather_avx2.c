@@ -3,18 +3,52 @@
 
 #include <immintrin.h>
 
-static unsigned near(const struct render_gather_group *group, const struct render_gather_box *box,
-                     float reach2_mm2)
+static inline __attribute__((always_inline)) unsigned near_box(const struct render_gather_group *group,
+                                                               const __m256 min_mm[3],
+                                                               const __m256 max_mm[3], __m256 reach2_mm2)
 {
     __m256 distance2 = _mm256_setzero_ps();
     for (int k = 0; k < 3; k++) {
         const __m256 x = _mm256_load_ps(group->position_mm[k]);
-        const __m256 below = _mm256_sub_ps(_mm256_set1_ps(box->min_mm[k]), x);
-        const __m256 above = _mm256_sub_ps(x, _mm256_set1_ps(box->max_mm[k]));
+        const __m256 below = _mm256_sub_ps(min_mm[k], x), above = _mm256_sub_ps(x, max_mm[k]);
         const __m256 gap = _mm256_max_ps(_mm256_max_ps(below, above), _mm256_setzero_ps());
         distance2 = _mm256_fmadd_ps(gap, gap, distance2);
     }
-    return (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(distance2, _mm256_set1_ps(reach2_mm2), _CMP_LE_OQ));
+    return (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(distance2, reach2_mm2, _CMP_LE_OQ));
+}
+
+static inline __attribute__((always_inline)) void load_box(const struct render_gather_box *box,
+                                                           __m256 min_mm[3], __m256 max_mm[3])
+{
+    for (int k = 0; k < 3; k++) {
+        min_mm[k] = _mm256_broadcast_ss(&box->min_mm[k]);
+        max_mm[k] = _mm256_broadcast_ss(&box->max_mm[k]);
+    }
+}
+
+static unsigned near(const struct render_gather_group *group, const struct render_gather_box *box,
+                     float reach2_mm2)
+{
+    __m256 min_mm[3], max_mm[3];
+    load_box(box, min_mm, max_mm);
+    return near_box(group, min_mm, max_mm, _mm256_set1_ps(reach2_mm2));
+}
+
+static size_t list(const struct render_gather_group *groups, const uint32_t *numbers, size_t count,
+                   const struct render_gather_box *box, float reach2_mm2,
+                   const struct render_gather_source **sources, size_t *listed, size_t capacity)
+{
+    __m256 min_mm[3], max_mm[3];
+    load_box(box, min_mm, max_mm);
+    const __m256 reach2 = _mm256_set1_ps(reach2_mm2);
+    size_t g = 0, next = *listed;
+    for (; g < count && next + RENDER_GATHER_LANES <= capacity; g++) {
+        const struct render_gather_group *const group = &groups[numbers[g]];
+        for (unsigned bits = near_box(group, min_mm, max_mm, reach2); bits; bits &= bits - 1)
+            sources[next++] = &group->sources[__builtin_ctz(bits)];
+    }
+    *listed = next;
+    return g;
 }
 
 /* A column of pieces, one for each place. */
@@ -23,18 +57,22 @@ static inline __m256 pick(const float pieces[RENDER_GATHER_PIECES], __m256i piec
     return _mm256_permutevar8x32_ps(_mm256_load_ps(pieces), piece);
 }
 
-static void sum(const struct render_gather_kernel *kernel,
-                const struct render_gather_source *const *sources, size_t count,
-                struct render_gather_places *places)
+static inline __attribute__((always_inline)) void sum_all(const struct render_gather_kernel *kernel,
+                                                          const struct render_gather_source *const *sources,
+                                                          size_t count, struct render_gather_places *places,
+                                                          bool has_slopes)
 {
     const __m256 x = _mm256_load_ps(places->position_mm[0]), y = _mm256_load_ps(places->position_mm[1]),
                  z = _mm256_load_ps(places->position_mm[2]);
     const __m256 one = _mm256_set1_ps(1), inverse = _mm256_set1_ps(kernel->inverse_per_mm2),
                  reach2 = _mm256_set1_ps(kernel->reach2_mm2), middle = _mm256_set1_ps(1.25f);
     const __m256i within = _mm256_set1_epi32(0x3fffff), exponent = _mm256_set1_epi32(0x3f800000);
-    __m256 sums[IO_CHANNEL_COUNT];
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+    __m256 sums[IO_CHANNEL_COUNT], slopes[IO_CHANNEL_COUNT][3];
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         sums[c] = _mm256_load_ps(places->sums[c]);
+        for (int k = 0; has_slopes && k < 3; k++)
+            slopes[c][k] = _mm256_load_ps(places->slopes[c][k]);
+    }
     for (size_t s = 0; s < count; s++) {
         const struct render_gather_source *const source = sources[s];
         const float *const m = source->spread_mm2;
@@ -63,6 +101,9 @@ static void sum(const struct render_gather_kernel *kernel,
         const __m256 first = _mm256_mul_ps(slope, _mm256_set1_ps(trace));
         const __m256 second =
             _mm256_mul_ps(_mm256_mul_ps(slope, slope), _mm256_mul_ps(_mm256_set1_ps(4), along));
+        const __m256 slope_by_2 = _mm256_add_ps(slope, slope),
+                     first_by_4 = _mm256_mul_ps(first, _mm256_set1_ps(4)),
+                     second_by_3 = _mm256_mul_ps(second, _mm256_set1_ps(3));
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
             const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
             const __m256 t1 = pick(terms[1], piece), t2 = pick(terms[2], piece), t3 = pick(terms[3], piece);
@@ -74,10 +115,35 @@ static void sum(const struct render_gather_kernel *kernel,
             const float kept = source->flux_w[c] * (1 + kernel->lost_per_mm2[c] * trace);
             const __m256 flux = _mm256_and_ps(_mm256_set1_ps(kept), is_near);
             sums[c] = _mm256_fmadd_ps(flux, value, sums[c]);
+            if (has_slopes) {
+                const __m256 spread_bend =
+                    _mm256_fmadd_ps(first_by_4, half_bend, _mm256_fmadd_ps(second_by_3, t3, bend));
+                const __m256 change = _mm256_mul_ps(_mm256_mul_ps(flux, slope_by_2), spread_bend);
+                slopes[c][0] = _mm256_fmadd_ps(change, dx, slopes[c][0]);
+                slopes[c][1] = _mm256_fmadd_ps(change, dy, slopes[c][1]);
+                slopes[c][2] = _mm256_fmadd_ps(change, dz, slopes[c][2]);
+            }
         }
     }
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         _mm256_store_ps(places->sums[c], sums[c]);
+        for (int k = 0; has_slopes && k < 3; k++)
+            _mm256_store_ps(places->slopes[c][k], slopes[c][k]);
+    }
 }
 
-const struct render_gather_loops render_gather_loops_avx2 = { near, sum };
+static void sum(const struct render_gather_kernel *kernel,
+                const struct render_gather_source *const *sources, size_t count,
+                struct render_gather_places *places)
+{
+    sum_all(kernel, sources, count, places, false);
+}
+
+static void sum_with_slopes(const struct render_gather_kernel *kernel,
+                            const struct render_gather_source *const *sources, size_t count,
+                            struct render_gather_places *places)
+{
+    sum_all(kernel, sources, count, places, true);
+}
+
+const struct render_gather_loops render_gather_loops_avx2 = { near, list, sum, sum_with_slopes };

@@ -78,6 +78,8 @@ struct objects {
     dipole_status *statuses;                 /* of each */
     const struct render_plan_medium **media; /* of each */
     struct render_light_sample *samples;     /* object by object */
+    int *code_levels;                        /* of each: render_plan_code_level */
+    uint64_t *codes;                         /* of their cubes at rest; NULL: they have none */
     size_t *first;                           /* of each, and one past the last */
 };
 
@@ -88,9 +90,10 @@ static void sort_object(void *context, int index)
     all->statuses[o].code = DIPOLE_OK;
     if (!all->objects[o].medium)
         return;
-    if (!render_gather_sources_init(all->samples + all->first[o], all->first[o + 1] - all->first[o],
-                                    all->media[o]->bands, all->media[o]->band_count, &all->sources[o],
-                                    &all->statuses[o]))
+    const uint64_t *const codes = all->codes ? all->codes + all->first[o] : NULL;
+    if (!render_gather_sources_init(all->samples + all->first[o], codes, all->code_levels[o],
+                                    all->first[o + 1] - all->first[o], all->media[o]->bands,
+                                    all->media[o]->band_count, &all->sources[o], &all->statuses[o]))
         return;
     all->objects[o].sources = &all->sources[o];
 }
@@ -118,19 +121,22 @@ static void describe_objects(const struct render_gatherer *gatherer, const struc
         object->pixel_mm = object->medium ? fmin(object->pixel_mm, apart_mm) : apart_mm;
         object->medium = &gatherer->media[planned->medium];
         all->media[o] = &plan->of_medium[planned->medium];
+        all->code_levels[o] = render_plan_code_level(plan, i);
     }
 }
 
-/* Samples of all media, object by object. */
-static bool share_out_samples(const struct render_gatherer *gatherer, struct render_splatter *splatter,
-                              struct objects *all, dipole_status *status)
+/* Samples of all media, object by object. Those of the environment carry no codes of cubes at rest. */
+static bool share_out_samples(const struct render_gatherer *gatherer, const struct render_plan *plan,
+                              struct render_splatter *splatter, struct objects *all, dipole_status *status)
 {
     size_t count = 0;
     for (size_t m = 0; m < gatherer->medium_count; m++)
         count += render_splatter_samples(splatter, m)->count;
+    const bool has_codes = plan->coherence == RENDER_COHERENCE_SURFACE && !plan->has_environment;
     all->samples = calloc(count + 1, sizeof *all->samples);
+    all->codes = has_codes ? calloc(count + 1, sizeof *all->codes) : NULL;
     size_t *const next = calloc(all->count + 1, sizeof *next);
-    if (!all->samples || !next) {
+    if (!all->samples || (has_codes && !all->codes) || !next) {
         free(next);
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples", count);
     }
@@ -140,10 +146,13 @@ static bool share_out_samples(const struct render_gatherer *gatherer, struct ren
             for (size_t i = 0; i < of_medium->count; i++) {
                 const struct render_light_sample *const sample = &of_medium->samples[i];
                 const size_t o = all->count == 1 ? 0 : (size_t)sample->object;
-                if (is_placing)
-                    all->samples[next[o]++] = *sample;
-                else
+                if (!is_placing) {
                     all->first[o + 1]++;
+                    continue;
+                }
+                if (has_codes)
+                    all->codes[next[o]] = of_medium->codes[i];
+                all->samples[next[o]++] = *sample;
             }
         }
         for (size_t o = 0; !is_placing && o < all->count; o++) {
@@ -164,6 +173,8 @@ static void objects_end(struct objects *all)
     free(all->statuses);
     free((void *)all->media);
     free(all->samples);
+    free(all->codes);
+    free(all->code_levels);
     free(all->first);
 }
 
@@ -176,11 +187,12 @@ static bool objects_init(const struct render_gatherer *gatherer, const struct re
     all->statuses = calloc(all->count, sizeof *all->statuses);
     all->media = calloc(all->count, sizeof(const struct render_plan_medium *));
     all->first = calloc(all->count + 1, sizeof *all->first);
-    if (!all->objects || !all->sources || !all->statuses || !all->media || !all->first)
+    all->code_levels = calloc(all->count, sizeof *all->code_levels);
+    if (!all->code_levels || !all->objects || !all->sources || !all->statuses || !all->media || !all->first)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to gather for %zu objects",
                            all->count);
     describe_objects(gatherer, plan, all);
-    if (!share_out_samples(gatherer, splatter, all, status))
+    if (!share_out_samples(gatherer, plan, splatter, all, status))
         return false;
     lut_parallel_for((int)all->count, 0, sort_object, all);
     for (size_t o = 0; o < all->count; o++) {
@@ -225,7 +237,9 @@ static bool gather(const struct render_frame *frame, const struct render_gather_
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
                            "no memory for the radiosity of %dx%d pixels", request->width_px,
                            request->height_px);
-    const bool done = render_gather_run(request, radiosity, NULL, status);
+    struct render_gather_request with_slopes = *request;
+    with_slopes.has_slopes = true; /* which OpenGL's shaders do not know */
+    const bool done = render_gather_run(&with_slopes, radiosity, NULL, status);
     if (done)
         glTextureSubImage2D(render_executor_texture(frame->executor, "radiosity"), 0, 0, 0,
                             request->width_px, request->height_px, GL_RGBA, GL_FLOAT, radiosity);

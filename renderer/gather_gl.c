@@ -18,8 +18,8 @@ enum {
 struct render_gather_gl {
     GLuint vertex_array, tile_buffer;
     struct render_buffer_texture sources, kernels, words;
-    GLuint levels, framebuffer; /* levels from 1 on, one above the other */
-    int width, height;          /* of that texture */
+    GLuint levels;     /* from 1 on, one above the other; 0: there were none yet */
+    int width, height; /* of that texture */
     struct render_gather_records records;
 };
 
@@ -45,7 +45,6 @@ void render_gather_gl_destroy(struct render_gather_gl *gl)
     glDeleteVertexArrays(1, &gl->vertex_array);
     glDeleteBuffers(1, &gl->tile_buffer);
     glDeleteTextures(1, &gl->levels);
-    glDeleteFramebuffers(1, &gl->framebuffer);
     render_buffer_texture_destroy(&gl->sources);
     render_buffer_texture_destroy(&gl->kernels);
     render_buffer_texture_destroy(&gl->words);
@@ -164,14 +163,11 @@ static bool make_levels(struct render_gather_gl *gl, const struct render_gather_
                            "(--gather c)",
                            places->request->width_px, places->request->height_px, width, height, limit);
     glDeleteTextures(1, &gl->levels);
-    glDeleteFramebuffers(1, &gl->framebuffer);
     glCreateTextures(GL_TEXTURE_2D, 1, &gl->levels);
     glTextureStorage2D(gl->levels, 1, GL_RGBA32F, width, height);
     glTextureParameteri(gl->levels, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTextureParameteri(gl->levels, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glObjectLabel(GL_TEXTURE, gl->levels, -1, "gather_levels");
-    glCreateFramebuffers(1, &gl->framebuffer);
-    glNamedFramebufferTexture(gl->framebuffer, GL_COLOR_ATTACHMENT0, gl->levels, 0);
     gl->width = width;
     gl->height = height;
     return true;
@@ -219,10 +215,13 @@ static bool draw_levels(struct render_gather_gl *gl, const struct render_frame *
     glBindTextureUnit(UNIT_LEVELS, gl->levels);
     render_set_int(frame->program, "levels", UNIT_LEVELS);
     glEnable(GL_PROGRAM_POINT_SIZE);
+    GLuint framebuffer;
+    glCreateFramebuffers(1, &framebuffer);
+    glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, gl->levels, 0);
     bool done = true;
     for (int l = places->level_count - 1; done && l >= 0; l--) {
         const struct render_gather_nodes *const level = &places->levels[l];
-        glBindFramebuffer(GL_FRAMEBUFFER, l > 0 ? gl->framebuffer : (GLuint)target);
+        glBindFramebuffer(GL_FRAMEBUFFER, l > 0 ? framebuffer : (GLuint)target);
         for (int row = 0; done && row < tile_rows(level); row += ROWS_AT_ONCE) {
             const int end = row + ROWS_AT_ONCE < tile_rows(level) ? row + ROWS_AT_ONCE : tile_rows(level);
             done = render_gather_record(places, l, row, end, first_groups, &gl->records, status) &&
@@ -231,6 +230,7 @@ static bool draw_levels(struct render_gather_gl *gl, const struct render_frame *
         glTextureBarrier(); /* the next level reads what this one has drawn */
     }
     glDisable(GL_PROGRAM_POINT_SIZE);
+    glDeleteFramebuffers(1, &framebuffer);
     return done;
 }
 

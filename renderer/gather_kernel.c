@@ -33,35 +33,66 @@ static void fit_cubic(const double values[RENDER_GATHER_TERMS], double terms[REN
     terms[3] = scale * scale * scale * 4 * chebyshev[3];
 }
 
-void render_gather_kernel_at(const struct render_gather_kernel *kernel, const float step_mm[3],
-                             const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT])
+/* d^T spread d */
+static float spread_along(const float d_mm[3], const float m[6])
 {
-    const float x = step_mm[0], y = step_mm[1], z = step_mm[2];
-    const float *const m = spread_mm2;
-    const float distance2_mm2 = x * x + y * y + z * z;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        rgb_out[c] = 0;
-    if (!(distance2_mm2 <= kernel->reach2_mm2))
-        return;
+    const float x = d_mm[0], y = d_mm[1], z = d_mm[2];
+    return x * (m[0] * x + 2 * (m[4] * z + m[5] * y)) + y * (m[1] * y + 2 * m[3] * z) + m[2] * z * z;
+}
+
+/* Its column, and the place in it. */
+static uint32_t find_piece(const struct render_gather_kernel *kernel, float distance2_mm2, float *t_out)
+{
     const float u = 1 + distance2_mm2 * kernel->inverse_per_mm2;
     uint32_t bits;
     memcpy(&bits, &u, sizeof bits);
     const uint32_t piece = bits >> 22 & (RENDER_GATHER_PIECES - 1);
     bits = (bits & 0x3fffffu) | 0x3f800000u;
+    memcpy(t_out, &bits, sizeof *t_out);
+    *t_out -= 1.25f;
+    return piece;
+}
+
+void render_gather_kernel_at(const struct render_gather_kernel *kernel, const float step_mm[3],
+                             const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT])
+{
+    const float distance2_mm2 = step_mm[0] * step_mm[0] + step_mm[1] * step_mm[1] + step_mm[2] * step_mm[2];
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        rgb_out[c] = 0;
+    if (!(distance2_mm2 <= kernel->reach2_mm2))
+        return;
     float t;
-    memcpy(&t, &bits, sizeof t);
-    t -= 1.25f;
+    const uint32_t piece = find_piece(kernel, distance2_mm2, &t);
     const float slope = kernel->slope[piece];
-    const float along =
-        x * (m[0] * x + 2 * (m[4] * z + m[5] * y)) + y * (m[1] * y + 2 * m[3] * z) + m[2] * z * z;
-    const float trace = m[0] + m[1] + m[2];
-    const float first = slope * trace, second = 4 * slope * slope * along;
+    const float trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2];
+    const float first = slope * trace, second = 4 * slope * slope * spread_along(step_mm, spread_mm2);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
         const float t0 = terms[0][piece], t1 = terms[1][piece], t2 = terms[2][piece], t3 = terms[3][piece];
         const float half_bend = t2 + 3 * t * t3; /* of the cubic */
         rgb_out[c] =
             t0 + t * (t1 + t * (t2 + t * t3)) + first * (t1 + t * (half_bend + t2)) + second * half_bend;
+        rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * trace;
+    }
+}
+
+void render_gather_kernel_change_at(const struct render_gather_kernel *kernel, const float step_mm[3],
+                                    const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT])
+{
+    const float distance2_mm2 = step_mm[0] * step_mm[0] + step_mm[1] * step_mm[1] + step_mm[2] * step_mm[2];
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        rgb_out[c] = 0;
+    if (!(distance2_mm2 <= kernel->reach2_mm2))
+        return;
+    float t;
+    const uint32_t piece = find_piece(kernel, distance2_mm2, &t);
+    const float slope = kernel->slope[piece], trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2];
+    const float first = slope * trace, second = 4 * slope * slope * spread_along(step_mm, spread_mm2);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
+        const float t1 = terms[1][piece], t2 = terms[2][piece], t3 = terms[3][piece];
+        const float half_bend = t2 + 3 * t * t3;
+        rgb_out[c] = slope * (t1 + t * (half_bend + t2) + 4 * first * half_bend + 3 * second * t3);
         rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * trace;
     }
 }
@@ -99,7 +130,8 @@ static void keep_power(const struct render_split *split, int band, struct render
     power_of(split, band, kernel, 0, narrow);
     power_of(split, band, kernel, spread_mm2, wide);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        if (!(narrow[c] > 0))
+        /* Where the lobes of a blurred profile cancel, there is nothing to be kept. */
+        if (!(fabs(narrow[c] - exact[c]) < 0.5 * exact[c] && fabs(wide[c] - narrow[c]) < narrow[c]))
             continue;
         kernel->lost_per_mm2[c] = (float)((1 - wide[c] / narrow[c]) / (2 * spread_mm2));
         for (int k = 0; k < RENDER_GATHER_TERMS; k++) {

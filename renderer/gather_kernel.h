@@ -32,10 +32,17 @@ void render_gather_kernel_init(const struct render_split *split, int band,
 void render_gather_kernel_at(const struct render_gather_kernel *kernel, const float step_mm[3],
                              const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT]);
 
+/* Half its derivative along the step by the step's length, in 1/mm^4, as if they were spread the same in
+ * the plane. */
+void render_gather_kernel_change_at(const struct render_gather_kernel *kernel, const float step_mm[3],
+                                    const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT]);
+
 /* Places, one column each. */
 struct render_gather_places {
     _Alignas(32) float position_mm[3][RENDER_GATHER_LANES];
     _Alignas(32) float sums[IO_CHANNEL_COUNT][RENDER_GATHER_LANES];
+    _Alignas(
+        32) float slopes[IO_CHANNEL_COUNT][3][RENDER_GATHER_LANES]; /* of the sums, per mm along x y z */
 };
 
 /* Light that enters about a point: flux, mean position, and how far it is spread: the mean of d d^T, d the
@@ -62,10 +69,19 @@ struct render_gather_loops {
     /* Sources of the group that are within reach of the box, a bit each. */
     unsigned (*near)(const struct render_gather_group *group, const struct render_gather_box *box,
                      float reach2_mm2);
+    /* The same of groups by their numbers, one after the other: adds sources to the list, of which *listed
+     * are there, until it may not hold those of one more. Returns how many groups were looked at. */
+    size_t (*list)(const struct render_gather_group *groups, const uint32_t *numbers, size_t count,
+                   const struct render_gather_box *box, float reach2_mm2,
+                   const struct render_gather_source **sources, size_t *listed, size_t capacity);
     /* Add flux x profile of each source in the list to the places' sums. */
     void (*sum)(const struct render_gather_kernel *kernel,
                 const struct render_gather_source *const *sources, size_t count,
                 struct render_gather_places *places);
+    /* The same, and to their slopes. */
+    void (*sum_with_slopes)(const struct render_gather_kernel *kernel,
+                            const struct render_gather_source *const *sources, size_t count,
+                            struct render_gather_places *places);
 };
 extern const struct render_gather_loops render_gather_loops_portable;
 #if defined(__x86_64__)

@@ -9,6 +9,40 @@ typedef struct render_gather_places_of_frame places_of_frame;
 
 /* ---- levels ------------------------------------------------------------------------------------- */
 
+/* How far nodes lie from a place: the length of their mean step, and the mean square and cube of steps. */
+struct spread {
+    double off_mm, square_mm2, cube_mm3;
+};
+
+/* Slopes at nodes take samples for spread the same all around, by which they are off by no more than this
+ * part. */
+#define SLOPE_ERROR 0.03
+
+/* What interpolation may be off by, by derivatives up to the second, or with slopes the third. theory.md
+ * T43 */
+static double interpolation_error(const struct render_gather_request *request, double slope, double bend,
+                                  double third, const struct spread *spread)
+{
+    if (!request->has_slopes)
+        return slope * spread->off_mm + 0.5 * bend * spread->square_mm2;
+    return 0.5 * bend * (spread->off_mm * spread->off_mm + SLOPE_ERROR * spread->square_mm2) +
+           third * (spread->cube_mm3 / 12 + 0.25 * spread->off_mm * spread->square_mm2);
+}
+
+/* Over what may be spent, of what is lit and of what is there; beyond 1 a band cannot be interpolated. */
+static double part_of_limit(const struct render_gather_request *request,
+                            const struct render_gather_object *object, int band,
+                            const struct spread *spread)
+{
+    const struct render_gather_medium *const medium = object->medium;
+    const double lit = interpolation_error(request, medium->slope_per_mm[band], medium->bend_per_mm2[band],
+                                           medium->third_per_mm3[band], spread);
+    const double own =
+        interpolation_error(request, medium->own_slope_per_mm[band], medium->own_bend_per_mm2[band],
+                            medium->own_third_per_mm3[band], spread);
+    return fmax(lit / request->epsilon, own / request->own_epsilon);
+}
+
 /* Bilinear interpolation over nodes g apart: sum of weights x squared distance is at most g^2/2, and half
  * of what may be spent is left for places that do not lie where they are interpolated. */
 static int level_of_band(const struct render_gather_request *request,
@@ -17,13 +51,22 @@ static int level_of_band(const struct render_gather_request *request,
     int level = 0;
     while (band > 0 && level + 1 < RENDER_GATHER_LEVELS) {
         const double apart_mm = ldexp(object->pixel_mm, level + 1);
-        const double square_mm2 = 0.25 * apart_mm * apart_mm;
-        if (object->medium->bend_per_mm2[band] * square_mm2 > 0.5 * request->epsilon ||
-            object->medium->own_bend_per_mm2[band] * square_mm2 > 0.5 * request->own_epsilon)
+        const struct spread worst = { .square_mm2 = 0.5 * apart_mm * apart_mm,
+                                      .cube_mm3 = sqrt(0.125) * apart_mm * apart_mm * apart_mm };
+        if (part_of_limit(request, object, band, &worst) > 0.5)
             break;
         level++;
     }
     return level;
+}
+
+/* Whether anything is to be done at a level: bands of its own; with slopes, what is coarser, too: so that
+ * it is refined at no more nodes than it must. */
+static bool has_nodes(const struct render_gather_request *request,
+                      const struct render_gather_schedule *schedule, int level)
+{
+    return level == 0 || schedule->first[level + 1] > schedule->first[level] ||
+           (request->has_slopes && schedule->coarser[level] >= 0);
 }
 
 static void schedule_bands(const struct render_gather_request *request,
@@ -40,7 +83,7 @@ static void schedule_bands(const struct render_gather_request *request,
     schedule->first[RENDER_GATHER_LEVELS] = count;
     for (int l = RENDER_GATHER_LEVELS - 1, coarser = -1; l >= 0; l--) {
         schedule->coarser[l] = coarser;
-        if (schedule->first[l + 1] > schedule->first[l])
+        if (has_nodes(request, schedule, l))
             coarser = l;
     }
 }
@@ -139,10 +182,9 @@ void render_gather_places_end(places_of_frame *places)
 
 /* ---- interpolation ------------------------------------------------------------------------------ */
 
-/* Nodes of level l about a pixel and their weights; false where bands from first on cannot be interpolated
- * there. */
-static bool blend(const places_of_frame *places, int l, int first, int32_t pixel, int object,
-                  struct render_gather_blend *blend)
+/* Nodes of level l about a pixel, their weights, and how they lie; false: there are none. */
+static bool blend(const places_of_frame *places, int l, int32_t pixel, int object,
+                  struct render_gather_blend *blend, struct spread *spread)
 {
     const struct render_gather_nodes *const level = &places->levels[l];
     const int width_px = places->request->width_px, side = 1 << l, half = side / 2;
@@ -150,7 +192,7 @@ static bool blend(const places_of_frame *places, int l, int first, int32_t pixel
     const int x = column / side - 1, y = row / side - 1; /* the node before, from -1 on */
     const float part_x = (float)(column % side) / (float)side, part_y = (float)(row % side) / (float)side;
     const float *const here = render_gather_place(places->request, pixel);
-    float weight_sum = 0, off_mm[3] = { 0, 0, 0 }, distance2 = 0;
+    float weight_sum = 0, off_mm[3] = { 0, 0, 0 }, square = 0, cube = 0;
     for (int corner = 0; corner < 4; corner++) {
         const int i = corner & 1, j = corner >> 1;
         const float weight = (i ? part_x : 1 - part_x) * (j ? part_y : 1 - part_y);
@@ -163,11 +205,14 @@ static bool blend(const places_of_frame *places, int l, int first, int32_t pixel
         blend->nodes[corner] = (y + j) * level->width + x + i;
         blend->weights[corner] = weight;
         weight_sum += weight;
+        float distance2 = 0;
         for (int k = 0; k < 3; k++) {
             const float step = there[k] - here[k];
             off_mm[k] += weight * step;
-            distance2 += weight * step * step;
+            distance2 += step * step;
         }
+        square += weight * distance2;
+        cube += weight * distance2 * sqrtf(distance2);
     }
     if (!(weight_sum > 0))
         return false;
@@ -176,12 +221,30 @@ static bool blend(const places_of_frame *places, int l, int first, int32_t pixel
         off2 += off_mm[k] * off_mm[k];
     for (int corner = 0; corner < 4; corner++)
         blend->weights[corner] /= weight_sum;
-    const struct render_gather_medium *const medium = places->request->objects[object].medium;
-    const double off = (double)(sqrtf(off2) / weight_sum), square = (double)(distance2 / weight_sum);
-    return medium->slope_per_mm[first] * off + 0.5 * medium->bend_per_mm2[first] * square <=
-               places->request->epsilon &&
-           medium->own_slope_per_mm[first] * off + 0.5 * medium->own_bend_per_mm2[first] * square <=
-               places->request->own_epsilon;
+    *spread = (struct spread){ .off_mm = (double)(sqrtf(off2) / weight_sum),
+                               .square_mm2 = (double)(square / weight_sum),
+                               .cube_mm3 = (double)(cube / weight_sum) };
+    return true;
+}
+
+/* What node n of a tile can take from the coarser level. */
+static void choose_bands(const places_of_frame *places, struct render_gather_tile *tile, int n)
+{
+    const struct render_gather_request *const request = places->request;
+    const struct render_gather_object *const object = &request->objects[tile->object];
+    struct spread spread;
+    tile->is_refined[n] = tile->is_half_refined[n] = false;
+    if (tile->coarser < 0)
+        return;
+    if (!blend(places, tile->coarser, tile->pixels[n], tile->object, &tile->blends[n], &spread))
+        tile->is_refined[n] = true;
+    else if (part_of_limit(request, object, tile->end, &spread) > 1) {
+        tile->is_half_refined[n] = request->has_slopes && tile->half_end < tile->last &&
+                                   part_of_limit(request, object, tile->half_end, &spread) <= 1;
+        tile->is_refined[n] = !tile->is_half_refined[n];
+    }
+    tile->refined_count += tile->is_refined[n];
+    tile->half_refined_count += tile->is_half_refined[n];
 }
 
 /* ---- tiles -------------------------------------------------------------------------------------- */
@@ -193,12 +256,6 @@ static int node_in_tile(int index, bool is_y)
     return is_y ? block / 2 * 2 + in_block / 4 : block % 2 * 4 + in_block % 4;
 }
 
-static bool is_idle(const places_of_frame *places, int level, int object)
-{
-    const int *const first = places->schedules[object].first;
-    return level > 0 && first[level] == first[level + 1];
-}
-
 bool render_gather_tile_init(const places_of_frame *places, int level, int tile_x, int tile_y, int least,
                              struct render_gather_tile *tile)
 {
@@ -207,11 +264,12 @@ bool render_gather_tile_init(const places_of_frame *places, int level, int tile_
     int objects[RENDER_GATHER_TILE_NODES];
     int32_t pixels[RENDER_GATHER_TILE_NODES];
     tile->object = INT32_MAX;
-    tile->count = tile->refined_count = 0;
+    tile->count = tile->refined_count = tile->half_refined_count = 0;
     for (int i = 0; i < RENDER_GATHER_TILE_NODES; i++) {
         pixels[i] = node_pixel(nodes, left + node_in_tile(i, false), low + node_in_tile(i, true));
         objects[i] = object_at(places, pixels[i]);
-        if (objects[i] >= least && objects[i] < tile->object && !is_idle(places, level, objects[i]))
+        if (objects[i] >= least && objects[i] < tile->object &&
+            has_nodes(places->request, &places->schedules[objects[i]], level))
             tile->object = objects[i];
     }
     if (tile->object == INT32_MAX)
@@ -221,15 +279,14 @@ bool render_gather_tile_init(const places_of_frame *places, int level, int tile_
     tile->end = schedule->first[level + 1];
     tile->last = places->request->objects[tile->object].medium->band_count;
     tile->coarser = schedule->coarser[level];
+    tile->half_end = tile->coarser < 0 ? tile->end : schedule->first[tile->coarser + 1];
     for (int i = 0; i < RENDER_GATHER_TILE_NODES; i++) {
         if (objects[i] != tile->object)
             continue;
         const int n = tile->count++;
         tile->pixels[n] = pixels[i];
         tile->nodes[n] = (low + node_in_tile(i, true)) * nodes->width + left + node_in_tile(i, false);
-        tile->is_refined[n] = tile->coarser >= 0 && !blend(places, tile->coarser, tile->end, pixels[i],
-                                                           tile->object, &tile->blends[n]);
-        tile->refined_count += tile->is_refined[n];
+        choose_bands(places, tile, n);
     }
     return true;
 }

@@ -38,11 +38,15 @@ void render_gather_places_end(struct render_gather_places_of_frame *places);
 /* Nodes of one object in a tile of a level, those that lie together one after the other. A node takes what
  * is coarser from blend's nodes of level coarser, unless it is refined: then it sums those bands itself. */
 struct render_gather_tile {
-    int object, count, refined_count;
+    int object, count, refined_count, half_refined_count;
     int first, end, last; /* bands: first .. end - 1 of the level, to last - 1 where it is refined */
     int coarser;          /* -1: there is nothing coarser */
     int32_t nodes[RENDER_GATHER_TILE_NODES], pixels[RENDER_GATHER_TILE_NODES];
     bool is_refined[RENDER_GATHER_TILE_NODES];
+    /* With slopes alone: not refined, but it sums end .. half_end - 1 itself, the bands of level coarser,
+     * and takes from its nodes what they have taken. */
+    bool is_half_refined[RENDER_GATHER_TILE_NODES];
+    int half_end;
     struct render_gather_blend {
         int32_t nodes[4];
         float weights[4];

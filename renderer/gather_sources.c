@@ -15,14 +15,16 @@ static void fill_keys(const struct render_light_sample *samples, size_t count, d
 {
     double min_mm[3] = { INFINITY, INFINITY, INFINITY };
     for (size_t i = 0; i < count; i++) {
-        for (int k = 0; k < 3; k++)
-            min_mm[k] = fmin(min_mm[k], (double)samples[i].position_mm[k]);
+        for (int k = 0; k < 3; k++) {
+            const double place_mm = (double)samples[i].position_mm[k];
+            min_mm[k] = place_mm < min_mm[k] ? place_mm : min_mm[k];
+        }
     }
     for (size_t i = 0; i < count; i++) {
-        const float *const at = samples[i].position_mm;
-        const double position_mm[3] = { (double)at[0], (double)at[1], (double)at[2] };
-        keys[i] =
-            (struct render_z_key){ .code = render_cube_code(position_mm, min_mm, cell_mm), .index = i };
+        double cell[3];
+        for (int k = 0; k < 3; k++)
+            cell[k] = ((double)samples[i].position_mm[k] - min_mm[k]) / cell_mm;
+        keys[i] = (struct render_z_key){ .code = render_z_order(cell), .index = i };
     }
 }
 
@@ -39,6 +41,8 @@ static struct render_gather_source merge_run(const struct render_gather_source *
     static const int rows[6][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 1, 2 }, { 2, 0 }, { 0, 1 } };
     double flux_w[3] = { 0, 0, 0 }, mean_mm[3] = { 0, 0, 0 }, spread_mm2[6] = { 0, 0, 0, 0, 0, 0 },
            weight_sum = 0;
+    if (count == 1)
+        return sources[0];
     for (size_t i = 0; i < count; i++) {
         const double weight = weight_of(&sources[i]);
         weight_sum += weight;
@@ -47,7 +51,7 @@ static struct render_gather_source merge_run(const struct render_gather_source *
             mean_mm[k] += weight * (double)sources[i].position_mm[k];
         }
     }
-    if (count == 1 || !(weight_sum > 0))
+    if (!(weight_sum > 0))
         return sources[0];
     for (int k = 0; k < 3; k++)
         mean_mm[k] /= weight_sum;
@@ -89,8 +93,8 @@ static size_t merge(struct render_gather_source *sources, uint64_t *codes, size_
 static void box_add(struct render_gather_box *box, const float min_mm[3], const float max_mm[3])
 {
     for (int k = 0; k < 3; k++) {
-        box->min_mm[k] = fminf(box->min_mm[k], min_mm[k]);
-        box->max_mm[k] = fmaxf(box->max_mm[k], max_mm[k]);
+        box->min_mm[k] = min_mm[k] < box->min_mm[k] ? min_mm[k] : box->min_mm[k];
+        box->max_mm[k] = max_mm[k] > box->max_mm[k] ? max_mm[k] : box->max_mm[k];
     }
 }
 
@@ -158,12 +162,16 @@ struct workshop {
     struct render_z_key *keys, *spare;
 };
 
-static bool fill_levels(const struct render_light_sample *samples, size_t count,
-                        const struct render_band *bands, int band_count, struct workshop *shop,
-                        struct render_gather_sources *sources)
+static bool fill_levels(const struct render_light_sample *samples, const uint64_t *codes, int code_level,
+                        size_t count, const struct render_band *bands, int band_count,
+                        struct workshop *shop, struct render_gather_sources *sources)
 {
     const double finest_mm = bands[0].spacing_mm;
-    fill_keys(samples, count, ldexp(finest_mm, 1 - ORDER_BITS), shop->keys);
+    const int order_bits = codes ? code_level + 1 : ORDER_BITS;
+    if (!codes)
+        fill_keys(samples, count, ldexp(finest_mm, 1 - order_bits), shop->keys);
+    for (size_t i = 0; codes && i < count; i++)
+        shop->keys[i] = (struct render_z_key){ .code = codes[i], .index = i };
     const struct render_z_key *const keys = render_light_samples_sort_keys(shop->keys, shop->spare, count);
     for (size_t i = 0; i < count; i++) {
         const struct render_light_sample *const sample = &samples[keys[i].index];
@@ -173,16 +181,18 @@ static bool fill_levels(const struct render_light_sample *samples, size_t count,
         memcpy(shop->sources[i].flux_w, sample->flux_w, sizeof sample->flux_w);
     }
     for (int b = 0; b < band_count; b++) {
-        count = merge(shop->sources, shop->codes, count, 3 * (ORDER_BITS + b - 1));
+        const int shift = order_bits + b - 1;
+        count = merge(shop->sources, shop->codes, count, 3 * (shift < 0 ? 0 : shift < 20 ? shift : 20));
         if (!level_init(shop->sources, count, &sources->levels[b]))
             return false;
     }
     return true;
 }
 
-bool render_gather_sources_init(const struct render_light_sample *samples, size_t count,
-                                const struct render_band *bands, int band_count,
-                                struct render_gather_sources *sources, dipole_status *status)
+bool render_gather_sources_init(const struct render_light_sample *samples, const uint64_t *codes,
+                                int code_level, size_t count, const struct render_band *bands,
+                                int band_count, struct render_gather_sources *sources,
+                                dipole_status *status)
 {
     *sources = (struct render_gather_sources){ .band_count = band_count };
     if (count == 0)
@@ -192,7 +202,7 @@ bool render_gather_sources_init(const struct render_light_sample *samples, size_
                              .keys = calloc(count, sizeof *shop.keys),
                              .spare = calloc(count, sizeof *shop.spare) };
     const bool done = shop.sources && shop.codes && shop.keys && shop.spare &&
-                      fill_levels(samples, count, bands, band_count, &shop, sources);
+                      fill_levels(samples, codes, code_level, count, bands, band_count, &shop, sources);
     free(shop.sources);
     free(shop.codes);
     free(shop.keys);
@@ -248,6 +258,14 @@ size_t render_gather_find(const struct render_gather_level *level, const struct 
         const size_t first = (size_t)index * RENDER_GATHER_FAN, below_count = level->box_counts[depth - 1];
         const size_t end =
             first + RENDER_GATHER_FAN < below_count ? first + RENDER_GATHER_FAN : below_count;
+        if (depth == 1 &&
+            capacity >= count + RENDER_GATHER_FAN) { /* the most common case, without branches */
+            for (size_t i = first; i < end; i++) {
+                groups[count] = (uint32_t)i;
+                count += is_near(&level->boxes[0][i], box, reach_mm * reach_mm);
+            }
+            continue;
+        }
         for (size_t i = end; i-- > first;) { /* the last first, so that groups come out in order */
             if (is_near(&level->boxes[depth - 1][i], box, reach_mm * reach_mm)) {
                 stack[height].depth = depth - 1;

@@ -25,9 +25,12 @@ struct render_gather_sources {
     struct render_gather_level levels[RENDER_BAND_LIMIT];
 };
 
-/* Samples are merged in cubes as wide as each band's spacing. Fails with DIPOLE_OUT_OF_MEMORY;
- * end them with render_gather_sources_end in any case. */
-DIPOLE_CHECKED bool render_gather_sources_init(const struct render_light_sample *samples, size_t count,
+/* Samples are merged in cubes as wide as each band's spacing. codes: of each sample the cube of
+ * cell_samples.h that it is of, which is merged with its neighbours at rest instead, 2^band to a side, so
+ * that the same samples are merged however the object moves; NULL: by where they are. Fails with
+ * DIPOLE_OUT_OF_MEMORY; end them with render_gather_sources_end in any case. */
+DIPOLE_CHECKED bool render_gather_sources_init(const struct render_light_sample *samples,
+                                               const uint64_t *codes, int code_level, size_t count,
                                                const struct render_band *bands, int band_count,
                                                struct render_gather_sources *sources,
                                                dipole_status *status);

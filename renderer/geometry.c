@@ -33,8 +33,8 @@ static void copy_vertices(const struct io_scene *scene, int array, float *values
     for (size_t i = 0; i < scene->object_count; i++) {
         const struct io_mesh *const mesh = io_object_rest(&scene->objects[i]);
         const float *const source = array == RENDER_VERTEX_POSITION ? mesh->positions : mesh->normals;
-        memcpy(values, source, 3 * mesh->vertex_count * sizeof *values);
-        values += 3 * mesh->vertex_count;
+        for (size_t v = 0; v < mesh->vertex_count; v++, values += RENDER_VERTEX_FLOATS)
+            memcpy(values, source + 3 * v, 3 * sizeof *values);
     }
 }
 
@@ -50,7 +50,7 @@ bool render_geometry_create(const struct io_scene *scene, struct render_geometry
     }
     if (!check_size(vertex_count, triangle_count, status))
         return false;
-    float *const values = calloc(vertex_count + 1, 3 * sizeof *values);
+    float *const values = calloc(vertex_count + 1, RENDER_VERTEX_FLOATS * sizeof *values);
     uint32_t(*const texels)[4] = calloc(triangle_count + 1, sizeof *texels);
     const bool done = values && texels;
     if (done) {
@@ -60,8 +60,8 @@ bool render_geometry_create(const struct io_scene *scene, struct render_geometry
     }
     for (int array = 0; done && array < RENDER_VERTEX_ARRAYS; array++) {
         copy_vertices(scene, array, values);
-        render_buffer_texture_fill(&geometry->vertices[array], GL_RGB32F, values,
-                                   3 * vertex_count * sizeof *values);
+        render_buffer_texture_fill(&geometry->vertices[array], GL_RGBA32F, values,
+                                   RENDER_VERTEX_FLOATS * vertex_count * sizeof *values);
     }
     free(values);
     free(texels);

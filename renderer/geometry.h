@@ -5,11 +5,13 @@
 
 #include "renderer/gl.h"
 
-/* What each vertex has: position in mm, unit normal; three floats each. */
+/* What each vertex has: position in mm, unit normal; x y z and a float that is not used: texels of four are
+ * fetched several times faster. */
 enum { RENDER_VERTEX_POSITION = 0, RENDER_VERTEX_NORMAL, RENDER_VERTEX_ARRAYS };
+enum { RENDER_VERTEX_FLOATS = 4 };
 
 struct render_geometry {
-    struct render_buffer_texture vertices[RENDER_VERTEX_ARRAYS]; /* RGB32F                          */
+    struct render_buffer_texture vertices[RENDER_VERTEX_ARRAYS]; /* RGBA32F                         */
     struct render_buffer_texture triangles; /* RGBA32UI: corners, counted over all objects; object from 1 */
 };
 

@@ -54,8 +54,8 @@ static double line_extent_mm(const struct reducer *reducer, int x, int y, int dx
             continue;
         const double depth = view->forward[0] * (double)t[0] + view->forward[1] * (double)t[1] +
                              view->forward[2] * (double)t[2];
-        depth_min = fmin(depth_min, depth);
-        depth_max = fmax(depth_max, depth);
+        depth_min = depth < depth_min ? depth : depth_min; /* as fmin(), but several times faster */
+        depth_max = depth > depth_max ? depth : depth_max;
         if (!first) {
             first = t;
             first_index = i;
@@ -189,11 +189,23 @@ static int next_object(const struct render_light_view *view, struct block block,
     return isfinite(next) ? (int)next - 1 : -1;
 }
 
+static bool is_lit(const struct render_light_view *view, struct block block)
+{
+    for (int y = block.y; y < block.y + block.height; y++) {
+        const float *const row = view->texels + 4 * ((size_t)y * (size_t)view->size_px + (size_t)block.x);
+        for (int i = 0; i < block.width; i++) {
+            if (row[4 * i + 3] > 0)
+                return true;
+        }
+    }
+    return false;
+}
+
 /* The block's samples, object by object. */
 static bool reduce_objects(struct reducer *reducer, struct block block)
 {
     const bool has_objects = reducer->view->objects != NULL;
-    int object = has_objects ? next_object(reducer->view, block, 0) : 0;
+    int object = has_objects ? next_object(reducer->view, block, 0) : is_lit(reducer->view, block) ? 0 : -1;
     while (object >= 0) {
         const struct render_light_target *const target = &reducer->targets[object];
         reducer->object = object;

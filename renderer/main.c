@@ -12,6 +12,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 struct options {
     struct cli_common common;
@@ -21,6 +22,7 @@ struct options {
     int technique, context, area, coherence, gather;
     int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int environment_samples;
+    const char *splat_grid;
     double ambient_visibility; /* rays */
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
@@ -58,6 +60,13 @@ static json_t *create_number(double number)
     return isfinite(number) ? json_real(number) : json_null();
 }
 
+/* The most memory that this process has had at once, so far. */
+static json_int_t peak_rss_bytes(void)
+{
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) == 0 ? (json_int_t)usage.ru_maxrss * 1024 : 0;
+}
+
 /* NULL: no memory, or a path that is not UTF-8. */
 static json_t *create_result(const struct render_report *report, const char *path)
 {
@@ -69,8 +78,9 @@ static json_t *create_result(const struct render_report *report, const char *pat
                                                  "predicted_ms", create_number(effect->predicted_ms), "ms",
                                                  effect->time_ms, "error", create_number(effect->error)));
     }
-    return json_pack("{s:s, s:f, s:o, s:f, s:s?}", "technique", render_technique_names[report->technique],
-                     "epsilon", report->epsilon, "effects", effects, "total_ms", report->total_ms, "image",
+    return json_pack("{s:s, s:f, s:o, s:f, s:I, s:s?}", "technique",
+                     render_technique_names[report->technique], "epsilon", report->epsilon, "effects",
+                     effects, "total_ms", report->total_ms, "peak_rss_bytes", peak_rss_bytes(), "image",
                      path);
 }
 
@@ -110,8 +120,12 @@ static void print_plan(const struct render_report *report)
         printf("%12s  estimated error\n", "samples");
     for (size_t i = 0; i < report->doubling_count; i++)
         printf("%12zu  %.3g\n", report->doublings[i].sample_count, report->doublings[i].error);
-    printf("%-16s  %-6s  %9s  %9s  %8s  reason\n%-16s  %-6s  %9s  %9s\n", "effect", "active", "predicted",
-           "time", "error", "", "", "ms", "ms");
+    int width = 0; /* of the longest name */
+    for (size_t e = 0; e < report->effect_count; e++)
+        width =
+            strlen(report->effects[e].name) > (size_t)width ? (int)strlen(report->effects[e].name) : width;
+    printf("%-*s  %-6s  %9s  %9s  %8s  reason\n%-*s  %-6s  %9s  %9s\n", width, "effect", "active",
+           "predicted", "time", "error", width, "", "", "ms", "ms");
     for (size_t e = 0; e < report->effect_count; e++) {
         const struct render_effect_report *const effect = &report->effects[e];
         char error[16] = "unbound.";
@@ -120,7 +134,7 @@ static void print_plan(const struct render_report *report)
         char predicted[16] = "-";
         if (isfinite(effect->predicted_ms))
             snprintf(predicted, sizeof predicted, "%.1f", effect->predicted_ms);
-        printf("%-16s  %-6s  %9s  %9.1f  %8s  %s\n", effect->name, effect->is_active ? "yes" : "no",
+        printf("%-*s  %-6s  %9s  %9.1f  %8s  %s\n", width, effect->name, effect->is_active ? "yes" : "no",
                predicted, effect->time_ms, error, effect->reason);
     }
 }
@@ -283,6 +297,22 @@ static bool check_frames(const struct options *options, const struct io_scene *s
                        options->frames[0], options->frames[1], count - 1);
 }
 
+/* What --splat-grid says; false: no such number. */
+static bool parse_grid(const char *text, int *grid_out)
+{
+    *grid_out = text && strcmp(text, "auto") == 0 ? RENDER_SPLAT_GRID_AUTO : 0;
+    if (!text || *grid_out == RENDER_SPLAT_GRID_AUTO)
+        return true;
+    char *end = NULL;
+    const long number = strtol(text, &end, 10);
+    const bool is_grid =
+        number == 0 || (number >= RENDER_SPLAT_GRID_MIN && number <= RENDER_SPLAT_GRID_MAX);
+    if (*text < '0' || *text > '9' || *end != '\0' || !is_grid)
+        return false;
+    *grid_out = (int)number;
+    return true;
+}
+
 static bool run(const struct cli_tool *tool, const struct options *options, const char *scene_path,
                 dipole_status *status)
 {
@@ -309,6 +339,7 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                                              .layer_count = 2 * options->layer_pairs } },
                        .frame_count = options->frames[1] - options->frames[0] + 1 };
     bool is_png = false, done = false;
+    parse_grid(options->splat_grid, &job.drawing.splat_grid);
     if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
         io_scene_read(scene_path, &reading, &job.scene, status) && check_frames(options, job.scene, status))
         done = options->technique == RENDER_TECHNIQUE_REFERENCE ? draw(&job, status)
@@ -325,6 +356,11 @@ static bool check_usage(const struct options *options, dipole_status *status)
     const bool has_samples = is_splat || technique == RENDER_TECHNIQUE_GATHER;
     const bool may_gather = technique == RENDER_TECHNIQUE_AUTO || technique == RENDER_TECHNIQUE_GATHER;
     const bool is_reference = technique == RENDER_TECHNIQUE_REFERENCE;
+    int grid;
+    if (!parse_grid(options->splat_grid, &grid))
+        return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
+                           "--splat-grid is \"%.40s\", expected auto, 0 or a whole number from %d to %d",
+                           options->splat_grid, RENDER_SPLAT_GRID_MIN, RENDER_SPLAT_GRID_MAX);
     const bool has_tsm_options = options->tsm_gather || options->tsm_response || options->tsm_part ||
                                  options->tsm_samples || options->layer_pairs;
     const struct {
@@ -340,6 +376,10 @@ static bool check_usage(const struct options *options, dipole_status *status)
         { is_reference && options->context >= 0, "--technique reference cannot be used with --context" },
         { options->area != RENDER_AREA_FLUX && !is_splat && !options->is_viewed,
           "--splat-area is of --technique splat alone" },
+        { grid != 0 && !is_splat && !options->is_viewed, "--splat-grid is of --technique splat alone" },
+        { grid != 0 && options->coherence > RENDER_COHERENCE_NONE,
+          "--splat-grid cannot be used with --coherence two-pass or surface: its samples are texels of the "
+          "light's view" },
         { options->coherence != RENDER_COHERENCE_AUTO && !has_samples && !options->is_viewed,
           "--coherence is of --technique gather and splat alone" },
         { options->gather != RENDER_GATHER_AUTO && !may_gather && !options->is_viewed,
@@ -400,6 +440,17 @@ int main(int argc, char **argv)
               "Area that a light sample stands for: flux, which needs none, or overlap, counted as in the "
               "paper, for comparison. Default flux.",
           .choices = render_area_names },
+        {
+            .name = "splat-grid",
+            .kind = CLI_TEXT,
+            .target = &options.splat_grid,
+            .argument = "N",
+            .help = "Draw one splat for each lit texel of a uniform grid of N x N texels over each light's "
+                    "view, as "
+                    "in the paper, for comparison: 2 to 4096, or auto, as many as epsilon asks for on "
+                    "surfaces that "
+                    "face the light. Default 0: samples follow the surface and are summed in bands.",
+        },
         { .name = "tsm",
           .kind = CLI_CHOICE,
           .target = &options.tsm_gather,

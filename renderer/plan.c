@@ -221,7 +221,8 @@ static bool read_scene(const struct render_request *request, struct render_plan 
                        dipole_status *status)
 {
     const struct io_scene *const scene = request->scene;
-    if (!render_plan_check_request(scene, request->epsilon, status) || !take_media(request, plan, status) ||
+    if (!render_plan_check_request(scene, request->epsilon, status) ||
+        !render_plan_check_grid(request, status) || !take_media(request, plan, status) ||
         !render_plan_take_environment(request, plan, status))
         return false;
     plan->epsilon = request->epsilon;
@@ -279,7 +280,8 @@ static enum render_technique fastest_technique(const struct render_request *requ
 {
     if (plan->has_scattering && plan->r_max_px < 1)
         return RENDER_TECHNIQUE_LAMBERT;
-    if (request->area != RENDER_AREA_FLUX || plan->epsilon < RENDER_GATHER_EPSILON_MIN)
+    if (request->area != RENDER_AREA_FLUX || request->splat_grid != 0 ||
+        plan->epsilon < RENDER_GATHER_EPSILON_MIN)
         return RENDER_TECHNIQUE_SPLAT;
     return RENDER_TECHNIQUE_GATHER;
 }
@@ -294,6 +296,8 @@ static void choose_technique(const struct render_request *request, struct render
         plan->technique = fastest_technique(request, plan);
     if (plan->technique != RENDER_TECHNIQUE_SPLAT)
         plan->area = RENDER_AREA_FLUX;
+    plan->has_grid = request->splat_grid != 0 && plan->technique == RENDER_TECHNIQUE_SPLAT &&
+                     !request->is_captured && plan->lit_count > 0;
 }
 
 const char *const render_gather_names[] = { "auto", "c", "gl", NULL };
@@ -348,6 +352,8 @@ bool render_plan_create(const struct render_request *request, struct render_plan
     }
     if (done) {
         render_plan_settle_spacing(request, plan);
+        if (!plan->has_object_ids) /* footprints may reach farther than the profile */
+            tell_objects_apart(request, plan);
         render_plan_predict_error(request, plan);
         render_plan_predict_map_error(request, plan);
         choose_gather(request, plan);

@@ -27,6 +27,7 @@ struct render_request {
     enum render_technique technique;
     enum render_area area;
     enum render_coherence coherence;
+    int splat_grid; /* as in render_options */
     enum render_gather gather;
     bool has_gpu;     /* OpenGL is not software */
     bool is_captured; /* no scattering; what it would need is kept instead */
@@ -157,6 +158,9 @@ struct render_plan_medium {
 struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
     enum render_area area;
+    bool has_light_pictures; /* what lights see is drawn in memory: only their samples need it */
+    bool has_grid;        /* samples are the texels of a uniform grid of each light's view, in one band */
+    double grid_texel_mm; /* across the view, at the widest */
     enum render_coherence coherence; /* never AUTO; NONE where no light samples move */
     enum render_gather gather;       /* never AUTO; C unless the technique is GATHER */
     char gather_reason[96];          /* why */
@@ -262,6 +266,15 @@ int render_plan_peel_side_px(const struct render_plan *plan, size_t object);
 /* The axis of RENDER_ENVIRONMENT_PEEL: y. */
 enum { RENDER_PEEL_AXIS = 1 };
 
+/*
+ * Aliasing of a grid whose texels are texel_mm wide across a light's view, at most, on surfaces of any
+ * slope to the light, as part of the radiosity of one that faces it. theory.md T44
+ */
+double render_plan_grid_aliasing(const dipole_stack *stack, double texel_mm);
+
+/* Pixels that the rectangles of a uniform grid's splats cover, about, each once for each splat. */
+double render_plan_grid_fragments(const struct render_plan *plan);
+
 /* Fails for a number of rays that is out of range. */
 DIPOLE_CHECKED bool render_plan_check_rays(int ray_count, dipole_status *status);
 
@@ -274,5 +287,9 @@ int render_plan_map_side_px(const struct render_plan *plan);
 /* Whether a pass of the plan writes, or needs, that texture. */
 bool render_plan_writes(const struct render_plan *plan, const char *texture);
 bool render_plan_reads(const struct render_plan *plan, const char *texture);
+
+/* Cubes that samples stay in (cell_mm), 2^this to a side, are as wide as the finest band's spacing, or less
+ * by up to a half; may be negative. */
+int render_plan_code_level(const struct render_plan *plan, size_t object);
 
 #endif

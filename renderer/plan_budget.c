@@ -31,6 +31,11 @@
  * aliasing and blur, if samples may then be so many times farther apart. */
 #define BLUR_GAIN 2
 
+/* Where samples are farther apart than wanted, they are so many times as far on surfaces at a slant to the
+ * light: the more the view falls short of what it should have, up to this. Steeper ones get little light.
+ */
+#define SLOPE_LIMIT 4
+
 /* A sampled shape is followed by at least so many samples, however far the light scatters. */
 #define SAMPLES_ACROSS 32
 
@@ -258,12 +263,27 @@ static void settle_medium(const struct render_request *request, struct render_pl
     const double wanted_mm = planned->wanted_mm;
     if (!(wanted_mm > 0))
         return;
+    if (plan->has_grid) {
+        render_plan_settle_grid(plan, index, texel_mm);
+        return;
+    }
     const bool is_gathered = plan->technique == RENDER_TECHNIQUE_GATHER;
     const double decades = fmax(log10(CAP_EPSILON / plan->epsilon), 0);
     const double cap_spacings = is_gathered ? render_gather_cap_spacings(plan->banding_epsilon)
                                             : CAP_SPACINGS + CAP_SPACINGS_PER_DECADE * decades;
     const double finest_mm =
         (is_gathered ? render_gather_finest_spacings(plan->banding_epsilon) : 1) * planned->spacing_mm;
+    const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
+    const double on_slopes_mm = spacing_mm * fmin(fmax(spacing_mm / wanted_mm, 1), SLOPE_LIMIT);
+    planned->aliasing_error =
+        request->is_captured ? 0 : worst(medium, render_footprint_aliasing, on_slopes_mm, 0);
+    if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))
+        blur_channels(plan, medium, on_slopes_mm, planned);
+    const double widest_blur_mm = fmax(fmax(planned->blur_mm[0], planned->blur_mm[1]), planned->blur_mm[2]);
+    /* Footprints may be wider than the profile. */
+    const double blurred_mm = fmin(RENDER_FOOTPRINT_REACH * widest_blur_mm, planned->diameter_mm);
+    planned->r_max_mm = fmax(planned->r_max_mm, blurred_mm);
+    plan->r_max_mm = fmax(plan->r_max_mm, planned->r_max_mm);
     /* What is captured is summed by others, from the finest samples alone; so are samples that are counted.
      */
     const bool is_single = request->is_captured || plan->area == RENDER_AREA_OVERLAP;
@@ -273,11 +293,6 @@ static void settle_medium(const struct render_request *request, struct render_pl
     plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
     if (request->is_captured)
         return;
-    const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
-    planned->aliasing_error = worst(medium, render_footprint_aliasing, spacing_mm, 0);
-    if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))
-        blur_channels(plan, medium, spacing_mm, planned);
-    const double widest_blur_mm = fmax(fmax(planned->blur_mm[0], planned->blur_mm[1]), planned->blur_mm[2]);
     if (spacing_mm > wanted_mm * (1 + 1e-6))
         render_plan_add_note(
             plan,

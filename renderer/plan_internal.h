@@ -31,6 +31,13 @@ void render_plan_predict_error(const struct render_request *request, struct rend
 void render_plan_look_at_motion(const struct render_request *request, struct render_plan *plan);
 void render_plan_choose_cells(const struct render_request *request, struct render_plan *plan);
 
+/* plan_grid.c: whether the number of texels is one; then the views get as many as are asked, or as epsilon
+ * asks for, which fails for too many; and what error they leave, in one band. */
+DIPOLE_CHECKED bool render_plan_check_grid(const struct render_request *request, dipole_status *status);
+DIPOLE_CHECKED bool render_plan_choose_grids(const struct render_request *request, struct render_plan *plan,
+                                             dipole_status *status);
+void render_plan_settle_grid(struct render_plan *plan, size_t medium, double texel_mm);
+
 /* plan_views.c */
 DIPOLE_CHECKED bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,
                                            dipole_status *status);

@@ -44,7 +44,7 @@ void render_plan_look_at_motion(const struct render_request *request, struct ren
 
 void render_plan_choose_cells(const struct render_request *request, struct render_plan *plan)
 {
-    if (!render_plan_sums_samples(plan) || plan->lit_count == 0 || !plan->has_scattering)
+    if (!render_plan_sums_samples(plan) || plan->lit_count == 0 || !plan->has_scattering || plan->has_grid)
         plan->coherence = RENDER_COHERENCE_NONE;
     if (plan->coherence != RENDER_COHERENCE_SURFACE)
         return;
@@ -55,4 +55,12 @@ void render_plan_choose_cells(const struct render_request *request, struct rende
         plan->has_object_ids = true;
         plan->ids_reason = "samples stay on the surfaces of several objects";
     }
+}
+
+int render_plan_code_level(const struct render_plan *plan, size_t object)
+{
+    const struct render_plan_object *const planned = &plan->objects[object];
+    const double stretched_mm = CELL_SHARE * planned->spacing_mm; /* of a cube, where it is widest */
+    const double wanted_mm = plan->of_medium[planned->medium].bands[0].spacing_mm;
+    return stretched_mm > 0 ? (int)floor(log2(wanted_mm / stretched_mm) + 0.1) : 0;
 }

@@ -88,6 +88,18 @@ double render_plan_widest_spacing_mm(const struct render_plan *plan)
     return widest_mm;
 }
 
+/* Parallel light that only samples are taken of needs no texture: drawing it in memory is several times
+ * faster than reading one back. */
+static bool can_draw_in_memory(const struct render_request *request, const struct render_plan *plan)
+{
+    bool is_parallel = true;
+    for (size_t i = 0; i < plan->view_count; i++)
+        is_parallel &= plan->views[i].projection.is_orthographic;
+    return is_parallel && !request->has_gpu && render_plan_sums_samples(plan) && !plan->has_specular &&
+           !request->is_captured && plan->area == RENDER_AREA_FLUX &&
+           plan->coherence != RENDER_COHERENCE_SURFACE;
+}
+
 bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,
                             dipole_status *status)
 {
@@ -102,7 +114,10 @@ bool render_plan_make_views(const struct render_request *request, struct render_
         if (render_light_shines(&scene->lights[i]))
             plan->view_count += light_views(scene, plan, i, &plan->views[plan->view_count]);
     }
+    if (plan->has_grid)
+        return render_plan_choose_grids(request, plan, status);
     for (size_t i = 0; i < plan->view_count; i++)
         choose_view_size(plan, &plan->views[i]);
+    plan->has_light_pictures = can_draw_in_memory(request, plan);
     return true;
 }

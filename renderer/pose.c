@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
-static const GLintptr STRIDE = 3 * sizeof(float);
+static const GLintptr STRIDE = RENDER_VERTEX_FLOATS * sizeof(float);
 
 bool render_pose_program_create(GLuint *program_out, dipole_status *status)
 {

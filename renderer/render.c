@@ -158,7 +158,9 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
         .environment_error = plan->environment_error,
         .band_count = plan->band_count,
         .r_max_mm = is_splatted ? plan->r_max_mm : 0,
-        .spacing_mm = is_splatted ? plan->spacing_mm : 0,
+        .spacing_mm = !is_splatted     ? 0
+                      : plan->has_grid ? plan->grid_texel_mm
+                                       : plan->spacing_mm,
         .sample_count = splatter ? render_splatter_sample_count(splatter) : 0,
         .splat_count = splatter ? render_splatter_splat_count(splatter) : 0,
         .view_count = plan->view_count,
@@ -191,7 +193,8 @@ static void set_attributes(struct io_image *image, const struct render_plan *pla
     if (render_plan_reads(plan, "light_samples")) {
         io_image_set_number(image, "dipole:error_predicted", plan->error_predicted);
         io_image_set_number(image, "dipole:r_max_mm", plan->r_max_mm);
-        io_image_set_number(image, "dipole:spacing_mm", plan->spacing_mm);
+        io_image_set_number(image, "dipole:spacing_mm",
+                            plan->has_grid ? plan->grid_texel_mm : plan->spacing_mm);
         io_image_set_number(image, "dipole:blur_error", plan->blur_error);
         if (plan->media->count == 1 && plan->blur_error > 0)
             io_image_set_numbers(image, "dipole:blur_mm", plan->of_medium[0].blur_mm);
@@ -211,6 +214,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .technique = options->technique,
         .area = options->area,
         .coherence = options->coherence,
+        .splat_grid = options->splat_grid,
         .gather = options->gather,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
         .media = renderer->media,

@@ -35,6 +35,11 @@ extern const char *const render_technique_names[];
 enum render_area { RENDER_AREA_FLUX = 0, RENDER_AREA_OVERLAP };
 extern const char *const render_area_names[]; /* "flux", "overlap", NULL */
 
+/* Texels a side of a uniform grid of each light's view, whose lit texels are splats as in the paper; AUTO:
+ * as many as the spacing that epsilon asks for needs on surfaces that face the light (theory.md T11, T44).
+ */
+enum { RENDER_SPLAT_GRID_AUTO = -1, RENDER_SPLAT_GRID_MIN = 2, RENDER_SPLAT_GRID_MAX = 4096 };
+
 /* How light samples are kept from flickering over frames in which light or objects move: not at all; each
  * light's view sampled twice, half a block apart; or samples that stay on the surface. The default is the
  * last, where there is more than one frame. */
@@ -142,6 +147,7 @@ struct render_options {
     double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
     enum render_area area;
     enum render_coherence coherence;
+    int splat_grid; /* of splats alone; 0: samples follow the surface, summed in bands */
     enum render_gather gather;
     const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */

@@ -1,6 +1,7 @@
 #include "renderer/splat_draw.h"
 
 #include "renderer/cell_samples.h"
+#include "renderer/light_picture.h"
 #include "renderer/splats.h"
 
 #include <math.h>
@@ -114,6 +115,39 @@ static float *read_view(const struct render_frame *frame, const char *texture, G
     return texels;
 }
 
+/* The same, drawn in memory; false: no memory, or none of the texels. */
+static bool draw_picture(const struct render_frame *frame, float **texels_out, float **objects_out,
+                         dipole_status *status)
+{
+    const struct render_plan_view *const view = frame->view;
+    const struct io_scene *const scene = frame->request->scene;
+    const size_t texel_count = (size_t)view->size_px * (size_t)view->size_px;
+    struct render_light_mesh *const meshes = calloc(scene->object_count, sizeof *meshes);
+    float *const texels = malloc(texel_count * 4 * sizeof *texels);
+    float *const objects = frame->plan->has_object_ids ? malloc(texel_count * sizeof *objects) : NULL;
+    const struct render_light_picture picture = { .meshes = meshes,
+                                                  .mesh_count = scene->object_count,
+                                                  .projection = &view->projection,
+                                                  .size_px = view->size_px,
+                                                  .texel_area_mm2 = view->texel_area };
+    for (size_t i = 0; meshes && i < scene->object_count; i++)
+        meshes[i] =
+            (struct render_light_mesh){ .mesh = scene->objects[i].mesh,
+                                        .eta =
+                                            frame->plan->media->media[frame->plan->objects[i].medium].eta,
+                                        .has_hidden_inside = render_executor_hides_inside(frame, i) };
+    if (meshes && texels && (objects || !frame->plan->has_object_ids) &&
+        render_light_picture_draw(&picture, texels, objects, status)) {
+        *texels_out = texels;
+        *objects_out = objects;
+    } else {
+        free(texels);
+        free(objects);
+    }
+    free(meshes);
+    return *texels_out != NULL;
+}
+
 static struct render_light_target target_of(const struct render_frame *frame, size_t index,
                                             struct render_light_samples *samples)
 {
@@ -148,8 +182,13 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     const struct render_plan_view *const view = frame->view;
     const size_t object_count = frame->request->scene->object_count;
     struct render_light_target *const targets = calloc(object_count, sizeof *targets);
-    float *const texels = read_view(frame, "light_view", GL_RGBA, 4);
-    float *const objects = plan->has_object_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
+    float *texels = NULL, *objects = NULL;
+    if (!plan->has_light_pictures) {
+        texels = read_view(frame, "light_view", GL_RGBA, 4);
+        objects = plan->has_object_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
+    } else if (!draw_picture(frame, &texels, &objects, status)) {
+        texels = objects = NULL;
+    }
     const bool is_counted = plan->area == RENDER_AREA_OVERLAP;
     float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
     const bool is_fixed = plan->coherence == RENDER_COHERENCE_SURFACE;
@@ -281,7 +320,7 @@ static bool add_medium(struct render_splatter *splatter, const struct render_pla
 {
     const struct render_plan_medium *const planned = &plan->of_medium[medium];
     struct render_light_samples *const samples = splatter->of_medium[medium].bands;
-    const struct render_band_source source = { .table = table->lut, .row = table->row };
+    const struct render_band_source source = render_plan_band_key(plan, table, medium).source;
     for (int b = 0; b < planned->band_count; b++) {
         const struct render_band *const band = &planned->bands[b];
         const struct lut_axis axis = render_bands_axis(&source);
@@ -295,7 +334,8 @@ static bool add_medium(struct render_splatter *splatter, const struct render_pla
         if (b > 0 && !merge_band(plan, band->spacing_mm, &samples[b - 1], &samples[b], status))
             return false;
         if (!render_splats_append(&batch->splats, &samples[b], batch->sample_count, &plan->camera,
-                                  band->r_outer_mm, &profile, status) ||
+                                  band->r_outer_mm, &profile, plan->has_grid ? 1 : RENDER_SPLAT_SAMPLES,
+                                  status) ||
             !add_samples(batch, &samples[b], status))
             return false;
         *first_node += (size_t)axis.node_count;

@@ -31,11 +31,11 @@ static double box_radius_mm(const struct box *box)
 
 /* One past the last sample of the group that begins at first; its box in *box. */
 static size_t group_end(const struct render_light_samples *samples, size_t first, double radius_limit_mm,
-                        struct box *box)
+                        size_t sample_limit, struct box *box)
 {
     *box = (struct box){ { INFINITY, INFINITY, INFINITY }, { -INFINITY, -INFINITY, -INFINITY } };
     size_t end = first;
-    while (end < samples->count && end - first < RENDER_SPLAT_SAMPLES) {
+    while (end < samples->count && end - first < sample_limit) {
         struct box grown = *box;
         box_add(&grown, samples->samples[end].position_mm);
         if (end > first && (samples->samples[end].object != samples->samples[first].object ||
@@ -62,16 +62,17 @@ static bool reserve(struct render_splats *splats, size_t more, dipole_status *st
 
 bool render_splats_append(struct render_splats *out, const struct render_light_samples *samples,
                           size_t first_sample, const struct render_projection *camera, double r_max_mm,
-                          const struct render_splat_profile *profile, dipole_status *status)
+                          const struct render_splat_profile *profile, size_t sample_limit,
+                          dipole_status *status)
 {
     struct box box;
     size_t group_count = 0;
     for (size_t first = 0; first < samples->count; group_count++)
-        first = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
+        first = group_end(samples, first, GROUP_RADIUS * r_max_mm, sample_limit, &box);
     if (!reserve(out, group_count, status))
         return false;
     for (size_t first = 0, end; first < samples->count; first = end) {
-        end = group_end(samples, first, GROUP_RADIUS * r_max_mm, &box);
+        end = group_end(samples, first, GROUP_RADIUS * r_max_mm, sample_limit, &box);
         double centre_mm[3], in_view_mm[3], rectangle[4];
         for (int k = 0; k < 3; k++)
             centre_mm[k] = 0.5 * (box.min[k] + box.max[k]);

@@ -34,12 +34,14 @@ struct render_splats {
 /*
  * Append splats: samples of one object that follow each other and lie close together, compared with
  * r_max_mm, are grouped; what cannot be seen is left out. first_sample: how many samples stand before these
- * in the buffer. Fails with DIPOLE_OUT_OF_MEMORY.
+ * in the buffer. sample_limit: at most so many share a splat, 1 to RENDER_SPLAT_SAMPLES. Fails with
+ * DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_splats_append(struct render_splats *splats,
                                          const struct render_light_samples *samples, size_t first_sample,
                                          const struct render_projection *camera, double r_max_mm,
-                                         const struct render_splat_profile *profile, dipole_status *status);
+                                         const struct render_splat_profile *profile, size_t sample_limit,
+                                         dipole_status *status);
 void render_splats_destroy(struct render_splats *splats);
 
 #endif

@@ -3,7 +3,6 @@
 #ifndef RENDERER_Z_ORDER_H
 #define RENDERER_Z_ORDER_H
 
-#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -25,12 +24,14 @@ static inline uint64_t render_z_spread(uint64_t x)
     return (x | x << 2) & 0x1249249249249249;
 }
 
-/* Of a cube by its three whole numbers, kept to 0 to 2^21 - 1. */
+/* Of a cube by three numbers, rounded down, kept to 0 to 2^21 - 1. */
 static inline uint64_t render_z_order(const double cell[3])
 {
     uint64_t code = 0;
-    for (int k = 0; k < 3; k++)
-        code |= render_z_spread((uint64_t)fmin(fmax(cell[k], 0), 0x1fffff)) << k;
+    for (int k = 0; k < 3; k++) {
+        const double above = cell[k] > 0 ? cell[k] : 0, held = above < 0x1fffff ? above : 0x1fffff;
+        code |= render_z_spread((uint64_t)held) << k;
+    }
     return code;
 }
 

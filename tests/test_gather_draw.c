@@ -28,7 +28,7 @@ static bool is_active(const struct render_report *report, const char *effect)
     return false;
 }
 
-static void assert_same(const struct io_image *found, const struct io_image *expected)
+static void assert_same(const struct io_image *found, const struct io_image *expected, double limit)
 {
     struct deviation deviation = { 0 };
     for (size_t i = 0; i < 4 * (size_t)expected->width_px * (size_t)expected->height_px; i++)
@@ -36,20 +36,25 @@ static void assert_same(const struct io_image *found, const struct io_image *exp
     print_message("  relative RMSE %.1e, worst %.1e of the brightest\n", relative_rmse(&deviation),
                   deviation.worst / deviation.peak);
     assert_true(deviation.peak > 0.1);
-    assert_true(relative_rmse(&deviation) <= 1e-5);
-    assert_true(deviation.worst <= 1e-4 * deviation.peak);
+    assert_true(relative_rmse(&deviation) <= limit);
+    assert_true(deviation.worst <= 10 * limit * deviation.peak);
 }
 
-/* Oracle: the processor's sums, that test_gather.c compares with direct ones. OpenGL sums the same samples
- * at the same places: both differ by rounding alone, over levels of all kinds of epsilon, picture after
- * picture, smaller and larger. */
+/* Oracle: the processor's sums, that test_gather.c compares with direct ones. OpenGL sums the same samples.
+ * It interpolates without slopes, and so at other places: both differ by what interpolation may err by, a
+ * tenth of epsilon each. Where pixels are too far apart for that, by rounding alone. Picture after picture,
+ * nothing changes.
+ */
 static void opengl_gathers_the_same(void **state)
 {
     (void)state;
     static const struct {
         int width_px, height_px;
-        double epsilon;
-    } pictures[] = { { 203, 117, 0.03 }, { 64, 48, 0.003 }, { 301, 240, 0.1 } };
+        double epsilon, limit;
+    } pictures[] = { { 203, 117, 0.03, 0.006 },
+                     { 301, 240, 0.1, 0.02 },
+                     { 400, 300, 0.003, 6e-4 },
+                     { 21, 19, 0.003, 1e-6 } };
     for (size_t i = 0; i < sizeof pictures / sizeof *pictures; i++) {
         struct test_scene test;
         init_pair(&test, pictures[i].width_px, pictures[i].height_px);
@@ -64,7 +69,7 @@ static void opengl_gathers_the_same(void **state)
             assert_true(is_active(&report, k > 0 ? "gather_gl" : "gather"));
             assert_false(is_active(&report, k > 0 ? "gather" : "gather_gl"));
         }
-        assert_same(images[1], images[0]);
+        assert_same(images[1], images[0], pictures[i].limit);
         assert_memory_equal(images[2]->pixels, images[1]->pixels,
                             4 * sizeof(float) * (size_t)images[1]->width_px * (size_t)images[1]->height_px);
         for (int k = 0; k < 3; k++)
@@ -90,7 +95,7 @@ static void opengl_gathers_frame_after_frame(void **state)
         images[0] = draw(renderer, &options, NULL);
         options.gather = RENDER_GATHER_GL;
         images[1] = draw(renderer, &options, NULL);
-        assert_same(images[1], images[0]);
+        assert_same(images[1], images[0], 0.2 * options.epsilon);
         io_image_destroy(images[0]);
         io_image_destroy(images[1]);
     }

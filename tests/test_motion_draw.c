@@ -307,6 +307,44 @@ static void samples_stay_on_the_surface(void **state)
     io_scene_destroy(scene);
 }
 
+/* Oracle: the first frame. Where camera, lights and object turn alike every frame is the same picture, if
+ * what is merged at rest is what gathering sums: but for texels of the light's view and pixels at
+ * silhouettes that round otherwise, and what their levels interpolate. Cubes that stand still in space
+ * merge others. */
+static void gathering_goes_with_the_surface(void **state)
+{
+    (void)state;
+    struct io_scene *const scene =
+        read_scene(TORUS "\"motion\": {\"turn_deg\": -200}, \"specular\": false", "");
+    scene->frames.camera_turn_deg = scene->frames.lights_turn_deg = -200;
+    struct renderer *const renderer = renderer_for(scene);
+    double changes[2] = { 0, 0 };
+    for (int kind = 0; kind < 2; kind++) {
+        float *before = NULL;
+        for (int frame = 3; frame < 5; frame++) {
+            io_scene_set_frame(scene, frame);
+            render_plan_destroy(run(renderer, RENDER_TECHNIQUE_GATHER,
+                                    kind ? RENDER_COHERENCE_SURFACE : RENDER_COHERENCE_NONE));
+            float *const now = read_texture(renderer, "radiosity");
+            double sum = 0, change = 0;
+            for (size_t i = 0; before && i < 4 * PIXELS; i++) {
+                sum += (double)now[i];
+                change += fabs((double)now[i] - (double)before[i]);
+            }
+            changes[kind] = before ? change / sum : 0;
+            free(before);
+            before = now;
+        }
+        free(before);
+    }
+    assert_true(changes[1] < 5e-4);
+    assert_true(changes[0] > 5 * changes[1]);
+    print_message("  from frame to frame: %.2e in cubes of space, %.2e in those of the surface\n",
+                  changes[0], changes[1]);
+    render_destroy(renderer);
+    io_scene_destroy(scene);
+}
+
 static const struct render_decision *decision(const struct render_plan *plan, const char *name)
 {
     for (size_t e = 0; render_effects[e]; e++) {
@@ -360,6 +398,7 @@ int main(void)
         cmocka_unit_test(all_ways_of_sampling_keep_the_energy),
         cmocka_unit_test(frames_do_not_depend_on_those_before),
         cmocka_unit_test(samples_stay_on_the_surface),
+        cmocka_unit_test(gathering_goes_with_the_surface),
         cmocka_unit_test(only_what_moves_pays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -497,7 +497,8 @@ static void splats_hold_what_their_samples_reach(void **state)
     struct render_splats splats = { 0 };
     const double r_max_mm = 2;
     const struct render_splat_profile profile = { .first_node = 7 };
-    assert_true(render_splats_append(&splats, &samples, 0, &projection, r_max_mm, &profile, NULL));
+    assert_true(render_splats_append(&splats, &samples, 0, &projection, r_max_mm, &profile,
+                                     RENDER_SPLAT_SAMPLES, NULL));
     size_t next = 0;
     for (size_t s = 0; s < splats.count; s++) {
         const struct render_splat *const splat = &splats.splats[s];

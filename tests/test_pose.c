@@ -43,10 +43,12 @@ enum { MOTIONS = sizeof motions / sizeof *motions };
 
 static float *read_buffer(const struct render_geometry *geometry, int array, size_t vertex_count)
 {
-    float *const values = malloc(3 * vertex_count * sizeof *values);
+    float *const values = malloc(RENDER_VERTEX_FLOATS * vertex_count * sizeof *values);
     assert_non_null(values);
     glGetNamedBufferSubData(geometry->vertices[array].buffer, 0,
-                            (GLsizeiptr)(3 * vertex_count * sizeof *values), values);
+                            (GLsizeiptr)(RENDER_VERTEX_FLOATS * vertex_count * sizeof *values), values);
+    for (size_t v = 1; v < vertex_count; v++)
+        memmove(values + 3 * v, values + RENDER_VERTEX_FLOATS * v, 3 * sizeof *values);
     return values;
 }
 

@@ -115,9 +115,9 @@ static void check_topology(const struct io_mesh *mesh, const char *name, long ex
 }
 
 static const long characteristics[IO_PRIMITIVE_COUNT] = {
-    [IO_PRIMITIVE_SPHERE] = 2,  [IO_PRIMITIVE_CUBE] = 2, [IO_PRIMITIVE_SLAB] = 2,
-    [IO_PRIMITIVE_TORUS] = 0,   [IO_PRIMITIVE_KNOT] = 0, [IO_PRIMITIVE_BOWL] = 2,
-    [IO_PRIMITIVE_TERRAIN] = 2,
+    [IO_PRIMITIVE_SPHERE] = 2,  [IO_PRIMITIVE_CUBE] = 2,    [IO_PRIMITIVE_SLAB] = 2,
+    [IO_PRIMITIVE_TORUS] = 0,   [IO_PRIMITIVE_KNOT] = 0,    [IO_PRIMITIVE_BOWL] = 2,
+    [IO_PRIMITIVE_TERRAIN] = 2, [IO_PRIMITIVE_LANTERN] = 4, /* two surfaces */
 };
 
 /* Oracle: a closed orientable surface has two triangles at each edge, and V - E + F = 2 - 2 genus. */
@@ -168,6 +168,10 @@ static double exact_volume(enum io_primitive primitive)
     case IO_PRIMITIVE_TERRAIN: /* base, hills, fins: int exp(-s^4) ds = 2 Gamma(5/4), int (1-z^2)^2 dz =
                                   16/15 */
         return 4 * 0.3 + 4 * 0.05 + 0.65 * (0.12 + 0.06 + 0.03 + 0.015) * 2 * tgamma(1.25) * 16 / 15;
+    case IO_PRIMITIVE_LANTERN: /* int r^3/3 over directions: means of (1 - cos)/2 to the powers 1, 2, 3 are
+                                  1/2, 3/8, 5/16, integrals of sin^3, sin^5, sin^7 are 4/3, 16/15, 32/35 */
+        return 2 * PI / 3 *
+               (2 - 2 * 0.12 + 1.2 * 0.12 * 0.12 - 2.0 / 7 * 0.12 * 0.12 * 0.12 - 2 * 0.8 * 0.8 * 0.8);
     case IO_PRIMITIVE_COUNT:
         break;
     }
@@ -312,6 +316,7 @@ static void boxes_are_as_stated(void **state)
         { IO_PRIMITIVE_KNOT, { -0.83, -0.97, -0.4 }, { 1, 0.97, 0.4 }, 0.02 },
         { IO_PRIMITIVE_BOWL, { -1, -1, -1 }, { 1, 0.05, 1 }, 1e-6 },
         { IO_PRIMITIVE_TERRAIN, { -1, -0.3, -1 }, { 1, 0.75, 1 }, 0.1 },
+        { IO_PRIMITIVE_LANTERN, { -1, -1, -1 }, { 1, 1, 1 }, 1e-7 },
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct io_mesh *mesh = create(cases[i].primitive, 256);

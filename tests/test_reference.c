@@ -625,9 +625,11 @@ static void the_program_needs_no_opengl(void **state)
     json_t *const result = json_loads(run.out, 0, NULL);
     const char *technique, *image;
     double epsilon, total_ms;
+    json_int_t peak_rss_bytes;
     json_t *effects;
-    assert_int_equal(json_unpack(result, "{s:s, s:f, s:o, s:f, s:s !}", "technique", &technique, "epsilon",
-                                 &epsilon, "effects", &effects, "total_ms", &total_ms, "image", &image),
+    assert_int_equal(json_unpack(result, "{s:s, s:f, s:o, s:f, s:I, s:s !}", "technique", &technique,
+                                 "epsilon", &epsilon, "effects", &effects, "total_ms", &total_ms,
+                                 "peak_rss_bytes", &peak_rss_bytes, "image", &image),
                      0);
     assert_string_equal(technique, "reference");
     assert_int_equal(json_array_size(effects), 6);

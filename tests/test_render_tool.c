@@ -196,6 +196,21 @@ static void wrong_usage_is_code_2(void **state)
                "render: --technique reference cannot be used with --context\n");
     fails_with(RENDER " sphere.json -o bad.exr -t tsm --splat-area overlap", 2,
                "render: --splat-area is of --technique splat alone\n");
+    static const char *const grids[] = { "1", "-1", "4097", "4.5", "64x", "Auto", "99999999999999999999" };
+    for (size_t i = 0; i < sizeof grids / sizeof *grids; i++) {
+        char command[256], message[256];
+        snprintf(command, sizeof command, RENDER " sphere.json -o bad.exr --splat-grid=\"%s\"", grids[i]);
+        snprintf(message, sizeof message,
+                 "render: --splat-grid is \"%s\", expected auto, 0 or a whole number from 2 to 4096\n",
+                 grids[i]);
+        fails_with(command, 2, message);
+    }
+    fails_with(RENDER " sphere.json -o bad.exr -t gather --splat-grid 64", 2,
+               "render: --splat-grid is of --technique splat alone\n");
+    fails_with(RENDER " sphere.json -o bad.exr --splat-grid auto --coherence surface", 2,
+               "render: --splat-grid cannot be used with --coherence two-pass or surface: its samples are "
+               "texels of "
+               "the light's view\n");
     fails_with(RENDER " sphere.json -o bad.exr -t tsm --coherence surface", 2,
                "render: --coherence is of --technique gather and splat alone\n");
     static const char *const tsm_options[] = { "--tsm vertex", "--tsm-response exact", "--tsm-part local",
@@ -247,6 +262,27 @@ static void a_missing_context_names_what_was_tried(void **state)
                "core context; egl: eglCreateContext (4.5 core) failed with EGL error 0x3009\n");
 }
 
+/* What --explain prints of each effect stands under its heading, however long names are. */
+static void assert_explained_in_columns(const char *text)
+{
+    const char *const header = strstr(text, "effect ");
+    assert_non_null(header);
+    const size_t active = (size_t)(strstr(header, "active") - header),
+                 reason = (size_t)(strstr(header, "reason") - header);
+    size_t longest = 0, count = 0;
+    const char *line = strchr(strchr(header, '\n') + 1, '\n') + 1; /* after the units */
+    for (; strcspn(line, "\n") > reason; line = strchr(line, '\n') + 1, count++) {
+        const size_t name = strcspn(line, " ");
+        longest = name > longest ? name : longest;
+        assert_true(strspn(line + name, " ") == active - name);
+        assert_true(strncmp(line + active, "yes ", 4) == 0 || strncmp(line + active, "no  ", 4) == 0);
+        assert_true(line[reason - 1] == ' ' && line[reason - 2] == ' ' && line[reason - 3] != ' ');
+        assert_true(line[reason] != ' ');
+    }
+    assert_int_equal(active, longest + 2);
+    assert_true(count > 20);
+}
+
 /* Oracle: the JSON that was promised, and the attributes of the picture read back. */
 static void results_are_told_as_promised(void **state)
 {
@@ -260,6 +296,8 @@ static void results_are_told_as_promised(void **state)
     assert_string_equal(json_string_value(json_object_get(result, "image")), "a.exr");
     assert_close(json_number_value(json_object_get(result, "epsilon")), 0.02, 0, "epsilon");
     assert_true(json_number_value(json_object_get(result, "total_ms")) > 0);
+    const double peak_rss_bytes = json_number_value(json_object_get(result, "peak_rss_bytes"));
+    assert_true(peak_rss_bytes > 1e6 && peak_rss_bytes < 1e11); /* of a process with OpenGL */
     const json_t *const effects = json_object_get(result, "effects");
     assert_true(json_array_size(effects) >= 11);
     for (size_t i = 0; i < json_array_size(effects); i++) {
@@ -283,8 +321,10 @@ static void results_are_told_as_promised(void **state)
     assert_int_equal(
         run(RENDER " sphere.json -o b.exr --explain --size 32x24 -t lambert", out, err, sizeof err), 0);
     assert_non_null(strstr(out, "technique lambert, epsilon 0.01\n"));
-    assert_non_null(
-        strstr(out, "splat             no            0.0        0.0         0  technique is lambert\n"));
+    assert_explained_in_columns(out);
+    const char *const splat = strstr(out, "\nsplat ");
+    assert_non_null(splat);
+    assert_non_null(strstr(splat, "  no            0.0        0.0         0  technique is lambert\n"));
     assert_non_null(strstr(out, "b.exr: lambert, epsilon 0.01, "));
 }
 
@@ -340,7 +380,7 @@ static void frames_are_told_as_promised(void **state)
             char path[32];
             snprintf(path, sizeof path, "./a.b.%04d.png", k + 1);
             assert_string_equal(json_string_value(json_object_get(frame, "image")), path);
-            assert_int_equal(json_object_size(frame), 5);
+            assert_int_equal(json_object_size(frame), 6);
             assert_int_equal(access(path, R_OK), 0);
             total_ms += json_number_value(json_object_get(frame, "total_ms"));
         }

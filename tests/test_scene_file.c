@@ -699,7 +699,7 @@ static void wrong_values_are_refused(void **state)
           "4:22: objects[0].mesh is not a string, expected the path of a mesh file" },
         { { .object = "\"primitive\": \"teapot\", \"material\": " MATERIAL },
           "4:27: objects[0].primitive is \"teapot\", expected \"sphere\" or \"cube\" or \"slab\" or "
-          "\"torus\" or \"knot\" or \"bowl\" or \"terrain\"" },
+          "\"torus\" or \"knot\" or \"bowl\" or \"terrain\" or \"lantern\"" },
         { { .object = "\"primitive\": \"cube\", \"detail\": 3, \"material\": " MATERIAL },
           "4:45: objects[0].detail is 3, expected 4 to 4096" },
         { { .object = "\"primitive\": \"cube\", \"detail\": 4096, \"material\": " MATERIAL },

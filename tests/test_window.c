@@ -1,12 +1,6 @@
 /* render --view under Xvfb, driven by xdotool: what the screen shows is the picture. Skipped without them.
  */
-#include "check.h"
-
-#include "io/image.h"
-
-#include <stdlib.h>
-#include <string.h>
-#include <sys/wait.h>
+#include "window_files.h"
 
 /* Shows the scene, takes a screenshot, turns the camera by a left drag and takes another, goes back by R,
  * changes the technique by T, and closes by Q. A window is awaited by its title, a fine picture by its size
@@ -59,68 +53,27 @@ static const char scene[] =
     "  \"objects\": [{ \"primitive\": \"torus\", \"detail\": 64, \"transform\": { \"scale\": 4 },\n"
     "                \"material\": \"skin1\", \"roughness\": 0.4 }] }\n";
 
-static void write_file(const char *path, const char *text)
+/* Of whole pictures. */
+static double picture_difference(const char *a, const char *b)
 {
-    FILE *const file = fopen(path, "w");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0);
-    assert_int_equal(fclose(file), 0);
-}
-
-static struct io_image *read_png(const char *path)
-{
-    struct io_image *image;
-    dipole_status status;
-    if (!io_photo_read(path, IO_PHOTO_SRGB, NULL, &image, &status))
-        fail_msg("%s: %s", path, status.message);
-    assert_int_equal(image->width_px, 320);
-    assert_int_equal(image->height_px, 240);
-    return image;
-}
-
-/* Root mean square of the difference, in linear light. */
-static double difference(const char *a_path, const char *b_path)
-{
-    struct io_image *const a = read_png(a_path), *const b = read_png(b_path);
-    double sum2 = 0;
-    for (size_t i = 0; i < 320 * 240; i++) {
-        for (size_t c = 0; c < 3; c++) {
-            const double d = (double)a->pixels[(size_t)a->channel_count * i + c] -
-                             (double)b->pixels[(size_t)b->channel_count * i + c];
-            sum2 += d * d;
-        }
-    }
-    io_image_destroy(a);
-    io_image_destroy(b);
-    return sqrt(sum2 / (320 * 240 * 3));
+    return difference((struct part){ a, 0 }, (struct part){ b, 0 }, 320);
 }
 
 /* Oracle: the same scene without a window; 8 bits on the screen are all that may differ. */
 static void the_window_shows_the_picture_and_obeys(void **state)
 {
     (void)state;
-    if (system("command -v xvfb-run >/dev/null && command -v xdotool >/dev/null && "
-               "command -v import >/dev/null") != 0) {
-        print_message("  no xvfb-run, xdotool or import\n");
-        skip();
-    }
+    need_display();
     assert_int_equal(system("rm -f *.png"), 0);
     write_file("window.json", scene);
-    write_file("window.sh", script);
     assert_int_equal(system(PROGRAM_FOLDER "/render window.json -o headless.png >/dev/null"), 0);
-    /* each from a display number of its own: two that look for a free one at once find the same */
-    const int code = system("RENDER=" PROGRAM_FOLDER
-                            "/render xvfb-run -a -n $((100 + $$ % 900)) -s '-screen 0 800x600x24' "
-                            "sh window.sh >window.log 2>&1");
-    if (code != 0)
-        print_error("window.sh ended with %d: see window.log\n", WEXITSTATUS(code));
-    assert_int_equal(code, 0);
-    assert_true(difference("first.png", "headless.png") < 0.005);
-    assert_true(difference("home.png", "headless.png") < 0.005);
-    assert_true(difference("saved.png", "relit.png") < 0.005);
-    assert_true(difference("turned.png", "headless.png") > 0.01);
-    assert_true(difference("relit.png", "headless.png") > 0.01);
-    assert_true(difference("lambert.png", "relit.png") > 0.01);
+    run_script("window.sh", script, "800x600");
+    assert_true(picture_difference("first.png", "headless.png") < 0.005);
+    assert_true(picture_difference("home.png", "headless.png") < 0.005);
+    assert_true(picture_difference("saved.png", "relit.png") < 0.005);
+    assert_true(picture_difference("turned.png", "headless.png") > 0.01);
+    assert_true(picture_difference("relit.png", "headless.png") > 0.01);
+    assert_true(picture_difference("lambert.png", "relit.png") > 0.01);
 }
 
 int main(void)

@@ -1,15 +1,10 @@
 /* render --view under Xvfb with the panel open, driven by xdotool: technique, material, comparison, saving.
  * Skipped without them. */
-#include "check.h"
+#include "window_files.h"
 
-#include "io/image.h"
 #include "io/scene_file.h"
 
-#include <stdlib.h>
-#include <string.h>
-#include <sys/wait.h>
-
-enum { PANEL = 350, WIDTH = 640, HEIGHT = 800 };
+enum { PANEL = 350, WIDTH = 640 };
 
 /* Where things stand in the panel, with one object and nothing to warn of: docs/window.md has a picture. Of
  * the list of techniques the entries stand below each other from its second line on. */
@@ -19,11 +14,12 @@ static const char script[] =
     "until_true() { i=0; until \"$@\" >/dev/null 2>&1; do i=$((i + 1)); [ $i -lt 600 ]; sleep 0.1; done; "
     "}\n"
     "titled() { xdotool search --name \"panel.json - $1\"; }\n"
-    "settled() {\n" /* fine, and the same for a while; left in $2 */
+    "last=none\n"
+    "settled() {\n" /* fine, the same for a while, and no longer what was there last; left in $2 */
     "  titled \"$1\" && import -window \"$window\" settling.png && sleep 0.5 && titled \"$1\" &&\n"
-    "    import -window \"$window\" $2 && cmp -s settling.png $2\n"
+    "    import -window \"$window\" $2 && cmp -s settling.png $2 && ! cmp -s $last $2\n"
     "}\n"
-    "settle() { sleep 0.5; until_true settled \"$1\" $2; }\n"
+    "settle() { sleep 0.5; until_true settled \"$1\" $2; last=$2; }\n"
     "to() { xdotool mousemove --window \"$window\" $1 $2; sleep 0.2; }\n"
     "click() { to $1 $2; xdotool mousedown 1; sleep 0.2; xdotool mouseup 1; sleep 0.5; }\n"
     "drag() { to $1 $2; xdotool mousedown 1; sleep 0.2; to $((($1 + $3) / 2)) $2; to $3 $2; xdotool "
@@ -63,51 +59,6 @@ static const char scene_text[] =
     "  \"background\": [0.05, 0.1, 0.2],\n"
     "  \"objects\": [{ \"primitive\": \"torus\", \"detail\": 32, \"transform\": { \"scale\": 4 },\n"
     "                \"material\": \"skin1\", \"roughness\": 0.4 }] }\n";
-
-static void write_file(const char *path, const char *text)
-{
-    FILE *const file = fopen(path, "w");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0);
-    assert_int_equal(fclose(file), 0);
-}
-
-static struct io_image *read_png(const char *path)
-{
-    struct io_image *image;
-    dipole_status status;
-    if (!io_photo_read(path, IO_PHOTO_SRGB, NULL, &image, &status))
-        fail_msg("%s: %s", path, status.message);
-    return image;
-}
-
-/* Columns of a picture: from left to right, without right; all rows. */
-struct part {
-    const char *path;
-    int left;
-};
-
-/* Root mean square of the difference of two parts of that width, in linear light. */
-static double difference(struct part a, struct part b, int width)
-{
-    struct io_image *const one = read_png(a.path), *const other = read_png(b.path);
-    assert_true(one->width_px >= a.left + width && other->width_px >= b.left + width);
-    assert_true(one->height_px == HEIGHT && other->height_px == HEIGHT);
-    double sum2 = 0;
-    for (int y = 0; y < HEIGHT; y++) {
-        for (int x = 0; x < width; x++) {
-            const size_t i = (size_t)(y * one->width_px + a.left + x) * (size_t)one->channel_count;
-            const size_t k = (size_t)(y * other->width_px + b.left + x) * (size_t)other->channel_count;
-            for (size_t c = 0; c < 3; c++) {
-                const double d = (double)one->pixels[i + c] - (double)other->pixels[k + c];
-                sum2 += d * d;
-            }
-        }
-    }
-    io_image_destroy(one);
-    io_image_destroy(other);
-    return sqrt(sum2 / (3.0 * width * HEIGHT));
-}
 
 static double picture_difference(const char *a, const char *b)
 {
@@ -173,21 +124,10 @@ static void check_scene(void)
 static void the_panel_does_what_it_says(void **state)
 {
     (void)state;
-    if (system("command -v xvfb-run >/dev/null && command -v xdotool >/dev/null && "
-               "command -v import >/dev/null") != 0) {
-        print_message("  no xvfb-run, xdotool or import\n");
-        skip();
-    }
+    need_display();
     assert_int_equal(system("rm -rf *.png panel_view.json folder && mkdir folder"), 0);
     write_file("panel.json", scene_text);
-    write_file("panel.sh", script);
-    /* each from a display number of its own: two that look for a free one at once find the same */
-    const int code = system("RENDER=" PROGRAM_FOLDER
-                            "/render xvfb-run -a -n $((100 + $$ % 900)) -s '-screen 0 1200x820x24' "
-                            "sh panel.sh >panel.log 2>&1");
-    if (code != 0)
-        print_error("panel.sh ended with %d: see panel.log\n", WEXITSTATUS(code));
-    assert_int_equal(code, 0);
+    run_script("panel.sh", script, "1200x820");
     check_pictures();
     check_divider();
     check_scene();

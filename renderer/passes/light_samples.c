@@ -6,6 +6,14 @@
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
+static int largest_side_px(const struct render_plan *plan)
+{
+    int side_px = 0;
+    for (size_t i = 0; i < plan->view_count; i++)
+        side_px = plan->views[i].size_px > side_px ? plan->views[i].size_px : side_px;
+    return side_px;
+}
+
 static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
 {
     if (plan->lit_count == 0)
@@ -16,12 +24,19 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
     if (!plan->has_scattering)
         return render_not_called_for("no channel scatters");
+    if (plan->has_grid)
+        return render_called_for("uniform grid of up to %d texels a side, %.3g mm apart across the view",
+                                 largest_side_px(plan), plan->grid_texel_mm);
     return render_called_for("%.3g mm apart keep aliasing under %.3g", plan->spacing_mm,
                              plan->aliasing_epsilon);
 }
 
 static double cost_ms(const struct render_plan *plan)
 {
+    if (plan->has_light_pictures)
+        return render_cost_ms(RENDER_COST_PICTURE_TEXEL, render_cost_view_texels(plan)) +
+               (double)plan->view_count *
+                   render_cost_ms(RENDER_COST_PICTURE_TRIANGLE, (double)plan->triangle_count);
     return render_cost_ms(RENDER_COST_READ_TEXEL, render_cost_view_texels(plan));
 }
 
@@ -41,7 +56,7 @@ static const struct render_pass passes[] = {
     { .name = "light_samples",
       .draw = RENDER_DRAW_NOTHING,
       .is_per_view = true,
-      .reads = { "light_view" },
+      .reads_if_written = { "light_view" },
       .writes = { "light_samples" },
       .run = sample },
 };

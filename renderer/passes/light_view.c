@@ -14,6 +14,8 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no channel scatters and no surface is glossy");
     if (plan->technique == RENDER_TECHNIQUE_TSM && !plan->has_specular)
         return render_not_called_for("translucent shadow maps are seen instead");
+    if (plan->has_light_pictures)
+        return render_not_called_for("what parallel light sees is drawn in memory, for samples alone");
     return render_called_for("%zu of %zu lights shine, seen in %zu view%s of up to %d texels a side",
                              plan->lit_count, request->scene->light_count, plan->view_count,
                              plan->view_count == 1 ? "" : "s", plan->views[0].size_px);

@@ -18,14 +18,17 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no channel scatters");
     if (render_plan_dark_reason(plan))
         return render_not_called_for("%s", render_plan_dark_reason(plan));
+    if (plan->has_grid)
+        return render_called_for(
+            "one splat for each lit texel of a uniform grid, in one band: %.3g mm, %.3g pixels",
+            plan->r_max_mm, plan->r_max_px);
     return render_called_for("scattered light reaches %.3g mm, %.3g pixels", plan->r_max_mm,
                              plan->r_max_px);
 }
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS +
-           render_cost_ms(RENDER_COST_SPLAT_EVALUATION, render_cost_splat_evaluations(plan));
+    return RENDER_COST_PROGRAM_MS + render_cost_splats_ms(plan);
 }
 
 static double error(const struct render_plan *plan)

@@ -66,7 +66,8 @@ static const struct render_pass passes[] = {
       .reads = { "surface_triangle", "mesh_triangles", "mesh_positions_mm", "mesh_normals",
                  "mesh_roughness" },
       .reads_if_written = { "object_media" },
-      .writes = { "position_mm", "normal", "surface_exit" },
+      .writes = { "position_mm", "surface_exit" },
+      .writes_if_wanted = { "normal" },
       .depth_tested = "position_depth",
       .bind = bind_resolve },
 };

@@ -3,13 +3,14 @@
 #include "common/deform.glsl"
 layout(location = 0) in vec3 rest_mm;
 layout(location = 1) in vec3 rest_normal;
-out vec3 position_mm;
-out vec3 normal;
+out vec4 position_mm;
+out vec4 normal;
 
 void main()
 {
-    position_mm = rest_mm;
-    normal = rest_normal;
-    pose(position_mm, normal);
+    vec3 posed_mm = rest_mm, posed_normal = rest_normal;
+    pose(posed_mm, posed_normal);
+    position_mm = vec4(posed_mm, 0.0);
+    normal = vec4(posed_normal, 0.0);
     gl_Position = vec4(0.0, 0.0, 0.0, 1.0);
 }

@@ -7,10 +7,14 @@
 uniform float pixel_mm;     // size of a pixel; perspective: at distance 1
 uniform float gloss_spread;  // of normals, as part of the roughness, that gloss does not show (theory.md T58)
 layout(location = 0) out vec4 position_out_mm;
-layout(location = 1) out vec4 normal_out;
 // x: exit per sr of the points that show this surface, over 4; y: part of the pixel that is covered; z: that shows this
 // surface; w: bit i: point i does not; bit 4: gloss differs among those that do.
-layout(location = 2) out vec4 exit_out;
+layout(location = 1) out vec4 exit_out;
+#ifdef HAS_NORMAL
+layout(location = 2) out vec4 surface_normal;
+#endif
+
+vec4 normal_out;  // w: roughness
 
 surface_point points[4];
 bool is_shown[4];  // the same surface as the first
@@ -75,4 +79,7 @@ void main()
     }
     if (spread2 > gloss_spread * gloss_spread * normal_out.w * normal_out.w)
         exit_out.w += 16.0;
+#ifdef HAS_NORMAL
+    surface_normal = normal_out;
+#endif
 }

@@ -170,8 +170,9 @@ static void show_saving(struct window *window)
         return;
     gui_field("picture", panel->picture_path, sizeof panel->picture_path);
     gui_field("scene", panel->scene_path, sizeof panel->scene_path);
-    window->is_save_wanted |= gui_button("Save picture");
-    gui_tip("As seen, the left one of two: .exr linear, .png tone mapped.");
+    const bool is_compared = window->comparison != WINDOW_ALONE;
+    window->is_save_wanted |= gui_button(is_compared ? "Save left picture" : "Save picture");
+    gui_tip("As seen, without panel and labels: .exr linear, .png tone mapped.");
     gui_same_line();
     if (gui_button("Save scene"))
         window_save_scene(window);

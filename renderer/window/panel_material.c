@@ -7,7 +7,7 @@
 
 enum { NAME_LIMIT = 64 }; /* objects in the list of objects */
 
-static const struct gui_range sigma_a_range = { 1e-5, 10, true, "%.3g" };
+static const struct gui_range sigma_a_range = { 1e-5, 100, true, "%.3g" };
 static const struct gui_range sigma_s_range = { 1e-3, 1000, true, "%.3g" };
 static const struct gui_range reflectance_range = { 0.001, 0.999, false, "%.3f" };
 static const struct gui_range path_range = { 1e-3, 100, true, "%.3g" };
