@@ -66,32 +66,58 @@ static bool read_brightness(const struct io_json *at, const char *key, struct io
     return !light->is_stated || io_scene_get_rgb(at, key, light->rgb, status);
 }
 
+static bool read_spot(const struct io_json *at, struct io_light *light, dipole_status *status)
+{
+    double cone_deg = 0;
+    light->is_spot = true;
+    light->cone_blend = 0.15;
+    if (!io_json_get_number(at, "cone_deg", 0.1, 175, &cone_deg, status) ||
+        !io_json_get_number(at, "cone_blend", 0, 1, &light->cone_blend, status) ||
+        !io_scene_get_coordinates(at, "direction", light->direction, status))
+        return false;
+    light->cone_rad = cone_deg * IO_SCENE_RAD_PER_DEG;
+    return true;
+}
+
+static bool read_point_light(const struct io_json *at, double unit_mm, bool is_spot, struct io_light *light,
+                             dipole_status *status)
+{
+    static const char *const point_keys[] = { "kind", "position", "intensity", "size", NULL };
+    static const char *const spot_keys[] = { "kind",      "position", "direction",  "cone_deg",
+                                             "intensity", "size",     "cone_blend", NULL };
+    if (!io_json_check_object(at, is_spot ? spot_keys : point_keys, is_spot ? 4 : 2, status) ||
+        !io_scene_get_coordinates(at, "position", light->position_mm, status) ||
+        !io_json_get_number(at, "size", 0, IO_SCENE_LENGTH_MAX, &light->size_mm, status) ||
+        !read_brightness(at, "intensity", light, status) || (is_spot && !read_spot(at, light, status)))
+        return false;
+    light->size_mm *= unit_mm;
+    io_scene_scale_to_mm(light->position_mm, unit_mm);
+    return true;
+}
+
 bool io_scene_read_light(const struct io_json *at, double unit_mm, struct io_light *light,
                          dipole_status *status)
 {
-    static const char *const kinds[] = {
-        [IO_LIGHT_DIRECTIONAL] = "directional", [IO_LIGHT_POINT] = "point", NULL
-    };
-    static const char *const directional_keys[] = { "kind", "direction", "irradiance", NULL };
-    static const char *const point_keys[] = { "kind", "position", "intensity", NULL };
-    int kind = IO_LIGHT_DIRECTIONAL;
+    enum { DIRECTIONAL, POINT, SPOT };
+    static const char *const kinds[] = { "directional", "point", "spot", NULL };
+    static const char *const directional_keys[] = { "kind", "direction", "irradiance", "size_deg", NULL };
+    int kind = DIRECTIONAL;
+    double size_deg = 0;
     if (json_is_object(at->value) && !io_json_get_choice(at, "kind", kinds, &kind, status))
         return false;
-    *light = (struct io_light){ .kind = (enum io_light_kind)kind };
-    if (kind == IO_LIGHT_POINT) {
-        if (!io_json_check_object(at, point_keys, 2, status) ||
-            !io_scene_get_coordinates(at, "position", light->position_mm, status) ||
-            !read_brightness(at, "intensity", light, status))
+    *light = (struct io_light){ .kind = kind == DIRECTIONAL ? IO_LIGHT_DIRECTIONAL : IO_LIGHT_POINT };
+    if (kind == DIRECTIONAL) {
+        if (!io_json_check_object(at, directional_keys, 2, status) ||
+            !io_scene_get_coordinates(at, "direction", light->direction, status) ||
+            !io_json_get_number(at, "size_deg", 0, 90, &size_deg, status) ||
+            !read_brightness(at, "irradiance", light, status))
             return false;
-        io_scene_scale_to_mm(light->position_mm, unit_mm);
-        return true;
-    }
-    if (!io_json_check_object(at, directional_keys, 2, status) ||
-        !io_scene_get_coordinates(at, "direction", light->direction, status) ||
-        !read_brightness(at, "irradiance", light, status))
+        light->size_rad = size_deg * IO_SCENE_RAD_PER_DEG;
+    } else if (!read_point_light(at, unit_mm, kind == SPOT, light, status)) {
         return false;
+    }
     const struct io_json direction = io_json_member(at, "direction");
-    return io_scene_normalize(light->direction) ||
+    return kind == POINT || io_scene_normalize(light->direction) ||
            io_json_fail(&direction, DIPOLE_BAD_VALUE, status, "is [0, 0, 0], expected a direction");
 }
 
@@ -152,8 +178,8 @@ static bool create_primitive(const struct io_json *object, struct io_mesh **mesh
            io_json_fail(&at_detail, found.code, status, "is %d: %s", detail, found.message);
 }
 
-static bool read_shape(const struct io_json *object, const struct io_scene_options *options,
-                       struct io_mesh **mesh, dipole_status *status)
+bool io_scene_read_shape(const struct io_json *object, const struct io_scene_options *options,
+                         struct io_mesh **mesh, dipole_status *status)
 {
     const struct io_json file = io_json_member(object, "mesh"),
                          primitive = io_json_member(object, "primitive"),
@@ -180,7 +206,7 @@ static bool read_shapes(const struct io_json *at, const struct io_scene_options 
     struct io_scene_transform transform;
     if (!io_scene_read_transform(&transform_at, &transform, status))
         return false;
-    if (!sequence.value && (!read_shape(at, options, &object->mesh, status) ||
+    if (!sequence.value && (!io_scene_read_shape(at, options, &object->mesh, status) ||
                             !io_scene_fit_mesh(at, object->mesh, &transform, status) ||
                             !io_scene_place_mesh(at, &transform, unit_mm, object->mesh, status)))
         return false;
@@ -299,6 +325,24 @@ static bool read_lights(const struct io_json *at, double unit_mm, struct io_scen
     return true;
 }
 
+/* Counted first: its mesh is ours, also where reading fails. */
+static bool read_element(const struct io_json *at, const struct io_scene_options *options, double unit_mm,
+                         struct io_scene *scene, size_t *triangle_count, dipole_status *status)
+{
+    if (io_scene_is_blocker(at)) {
+        struct io_blocker *const blocker = &scene->blockers[scene->blocker_count++];
+        if (!io_scene_read_blocker(at, options, unit_mm, blocker, status))
+            return false;
+        *triangle_count += blocker->mesh->triangle_count;
+        return true;
+    }
+    struct io_object *const object = &scene->objects[scene->object_count++];
+    if (!read_object(at, options, scene, unit_mm, object, status))
+        return false;
+    *triangle_count += io_scene_triangle_count(object);
+    return true;
+}
+
 static bool read_objects(const struct io_json *at, const struct io_scene_options *options, double unit_mm,
                          struct io_scene *scene, dipole_status *status)
 {
@@ -306,20 +350,21 @@ static bool read_objects(const struct io_json *at, const struct io_scene_options
     if (!io_json_check_array(at, 1, OBJECT_LIMIT, &count, status))
         return false;
     scene->objects = calloc(count, sizeof *scene->objects);
-    if (!scene->objects)
+    scene->blockers = calloc(count, sizeof *scene->blockers);
+    if (!scene->objects || !scene->blockers)
         return io_json_fail(at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
-    while (scene->object_count < count) {
-        const struct io_json element = io_json_element(at, scene->object_count);
-        struct io_object *object =
-            &scene->objects[scene->object_count++]; /* counted first: its mesh is ours */
-        if (!read_object(&element, options, scene, unit_mm, object, status))
+    for (size_t i = 0; i < count; i++) {
+        const struct io_json element = io_json_element(at, i);
+        if (!read_element(&element, options, unit_mm, scene, &triangle_count, status))
             return false;
-        triangle_count += io_scene_triangle_count(object);
         if (triangle_count > IO_MESH_TRIANGLE_LIMIT)
             return io_json_fail(&element, DIPOLE_BAD_VALUE, status,
                                 "brings the scene to %zu triangles, expected at most %u", triangle_count,
                                 IO_MESH_TRIANGLE_LIMIT);
     }
+    if (scene->object_count == 0)
+        return io_json_fail(at, DIPOLE_BAD_VALUE, status,
+                            "are all without material, expected one that is seen");
     io_scene_pose_objects(scene, 0);
     return true;
 }
@@ -380,7 +425,10 @@ void io_scene_destroy(struct io_scene *scene)
         return;
     for (size_t i = 0; i < scene->object_count; i++)
         io_scene_end_object(&scene->objects[i]);
+    for (size_t i = 0; i < scene->blocker_count; i++)
+        io_mesh_destroy(scene->blockers[i].mesh);
     free(scene->objects);
+    free(scene->blockers);
     free(scene->lights);
     free(scene->frames.lights);
     free(scene);

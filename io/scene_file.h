@@ -14,6 +14,11 @@ struct io_light {
     double position_mm[3]; /* point                                                        */
     double rgb[3];         /* directional: irradiance on a facing surface in W/mm^2;
                               point: intensity in W/sr; finite, >= 0                       */
+    double size_mm;        /* point: diameter of the disc that it is, facing what it lights; 0: a point */
+    double size_rad;       /* directional: angle that its disc is seen under; 0: a direction            */
+    bool is_spot;          /* point: lights a cone about direction alone                                */
+    double cone_rad;       /* spot: angle between its sides, under pi                                   */
+    double cone_blend;     /* spot: part of that angle, 0 to 1, over which light falls to the edge      */
     bool is_stated;        /* else the file says nothing of rgb, and it is 1               */
 };
 
@@ -74,6 +79,21 @@ struct io_motion_kinds io_object_motion_kinds(const struct io_object *object);
  * most (of some that are looked at); 1 or more. The same in all frames. */
 double io_object_stretch(const struct io_object *object);
 
+/*
+ * What stands in the way of light, and is not seen itself. A solid keeps its opacity of the light on each
+ * way through it, or by extinction the more the longer the way; a sheet at each of its surfaces. Particles
+ * are discs that face the light.
+ */
+struct io_blocker {
+    char name[128];
+    struct io_mesh *mesh; /* positions in mm, in the world; of particles their middles, without triangles */
+    double particle_mm;   /* radius; 0: these are no particles                                            */
+    bool is_sheet;
+    bool has_extinction;
+    double opacity[3];           /* per channel, 0 to 1   */
+    double extinction_per_mm[3]; /* >= 0, if it has one   */
+};
+
 struct io_scene {
     char path[4096];
     struct io_camera camera; /* of frame 0, as are the lights, until io_scene_set_frame */
@@ -85,6 +105,8 @@ struct io_scene {
     struct io_environment environment;
     struct io_object *objects;
     size_t object_count;
+    struct io_blocker *blockers; /* stand among the file's objects; outside of min_mm, max_mm */
+    size_t blocker_count;
     double min_mm[3], max_mm[3];
     struct io_frames frames;
 };

@@ -64,6 +64,17 @@ DIPOLE_CHECKED bool io_scene_place_mesh(const struct io_json *at,
                                         const struct io_scene_transform *transform, double unit_mm,
                                         struct io_mesh *mesh, dipole_status *status);
 
+/* The one shape that an object names: a mesh file or a primitive. */
+DIPOLE_CHECKED bool io_scene_read_shape(const struct io_json *at, const struct io_scene_options *options,
+                                        struct io_mesh **mesh, dipole_status *status);
+
+/* Whether an element of objects is a blocker; then read it. Its mesh is set when reading failed after it,
+ * too. */
+bool io_scene_is_blocker(const struct io_json *at);
+DIPOLE_CHECKED bool io_scene_read_blocker(const struct io_json *at, const struct io_scene_options *options,
+                                          double unit_mm, struct io_blocker *blocker,
+                                          dipole_status *status);
+
 /* Read the mesh file that a string names. */
 DIPOLE_CHECKED bool io_scene_read_mesh(const struct io_json *at, const char *name,
                                        const struct io_scene_options *options, struct io_mesh **mesh,

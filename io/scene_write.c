@@ -87,16 +87,30 @@ static bool is_same_light(const struct io_light *a, const struct io_light *b)
 {
     return a->kind == b->kind && is_same(a->direction, b->direction) &&
            is_same(a->position_mm, b->position_mm) && is_same(a->rgb, b->rgb) &&
-           a->is_stated == b->is_stated;
+           a->is_stated == b->is_stated && a->size_mm == b->size_mm && a->size_rad == b->size_rad &&
+           a->is_spot == b->is_spot && a->cone_rad == b->cone_rad && a->cone_blend == b->cone_blend;
+}
+
+static json_t *number_or_null(double value)
+{
+    return value > 0 ? json_real(value) : NULL;
 }
 
 static json_t *light_to_json(const struct io_light *light, double unit_mm)
 {
-    const bool is_point = light->kind == IO_LIGHT_POINT;
-    return json_pack(
-        "{s:s, s:o, s:o*}", "kind", is_point ? "point" : "directional", is_point ? "position" : "direction",
-        is_point ? vector_of(light->position_mm, unit_mm) : vector_of(light->direction, 1),
-        is_point ? "intensity" : "irradiance", light->is_stated ? vector_of(light->rgb, 1) : NULL);
+    json_t *const rgb = light->is_stated ? vector_of(light->rgb, 1) : NULL;
+    if (light->kind == IO_LIGHT_DIRECTIONAL)
+        return json_pack("{s:s, s:o, s:o*, s:o*}", "kind", "directional", "direction",
+                         vector_of(light->direction, 1), "irradiance", rgb, "size_deg",
+                         number_or_null(light->size_rad / IO_SCENE_RAD_PER_DEG));
+    json_t *const size = number_or_null(light->size_mm / unit_mm);
+    if (!light->is_spot)
+        return json_pack("{s:s, s:o, s:o*, s:o*}", "kind", "point", "position",
+                         vector_of(light->position_mm, unit_mm), "intensity", rgb, "size", size);
+    return json_pack("{s:s, s:o, s:o, s:f, s:f, s:o*, s:o*}", "kind", "spot", "position",
+                     vector_of(light->position_mm, unit_mm), "direction", vector_of(light->direction, 1),
+                     "cone_deg", light->cone_rad / IO_SCENE_RAD_PER_DEG, "cone_blend", light->cone_blend,
+                     "intensity", rgb, "size", size);
 }
 
 /* A light that was not touched stays as it was written, wherever it stands by now. */
@@ -167,10 +181,11 @@ static bool is_same_material(const struct io_material *a, const struct io_materi
     return is_same_so_far;
 }
 
+/* index: in the file. */
 static bool change_object(const struct edit *edit, const struct io_json *at, size_t index,
-                          dipole_status *status)
+                          size_t object_index, dipole_status *status)
 {
-    const struct io_object *const now = &edit->scene->objects[index];
+    const struct io_object *const now = &edit->scene->objects[object_index];
     const struct io_json material = io_json_member(at, "material");
     json_t *const object = json_array_get(json_object_get(edit->copy, "objects"), index);
     struct io_material before;
@@ -187,19 +202,25 @@ static bool change_object(const struct edit *edit, const struct io_json *at, siz
             set(object, "specular", json_boolean(now->has_specular), status));
 }
 
+/* Blockers stand among the objects, and are never changed. */
 static bool change_objects(const struct edit *edit, dipole_status *status)
 {
     const struct io_json at = io_json_member(&edit->root, "objects");
-    size_t count;
+    size_t count, object = 0;
     if (!io_json_check_array(&at, 0, SIZE_MAX, &count, status))
         return false;
-    if (count != edit->scene->object_count)
-        return io_json_fail(&at, DIPOLE_BAD_VALUE, status,
-                            "has %zu objects by now, expected the %zu that were read", count,
-                            edit->scene->object_count);
+    const size_t expected = edit->scene->object_count + edit->scene->blocker_count;
     for (size_t i = 0; i < count; i++) {
         const struct io_json element = io_json_element(&at, i);
-        if (!change_object(edit, &element, i, status))
+        object += !io_scene_is_blocker(&element);
+    }
+    if (count != expected || object != edit->scene->object_count)
+        return io_json_fail(&at, DIPOLE_BAD_VALUE, status,
+                            "has %zu objects by now, expected the %zu that were read", count, expected);
+    object = 0;
+    for (size_t i = 0; i < count; i++) {
+        const struct io_json element = io_json_element(&at, i);
+        if (!io_scene_is_blocker(&element) && !change_object(edit, &element, i, object++, status))
             return false;
     }
     return true;
@@ -221,7 +242,8 @@ static const char *find_relative(json_t *root)
     const char *found = relative(json_object_get(json_object_get(root, "environment"), "image"));
     for (size_t i = 0; !found && i < json_array_size(objects); i++) {
         const json_t *const object = json_array_get(objects, i);
-        const char *const material = relative(json_object_get(object, "material"));
+        const char *const named = relative(json_object_get(object, "material"));
+        const char *const material = named ? named : relative(json_object_get(object, "extinction_of"));
         found = relative(json_object_get(object, "mesh"));
         if (!found && material && !io_material_is_bundled_name(material))
             found = material;

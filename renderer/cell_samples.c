@@ -18,7 +18,7 @@ struct cell {
     uint64_t code;
     int object; /* -1: a free slot */
     int texel_count;
-    double share, irradiance, moment[3];
+    double share, irradiance, moment[3], arriving[3];
     float min[3], max[3];
 };
 
@@ -124,6 +124,8 @@ static bool gather(const struct render_light_target *targets, const struct rende
         if (!find_cell(cells, code_of(&targets[object], view->rest_mm + 4 * i), object, &cell, status))
             return false;
         add_texel(cell, texel, view->irradiance ? (double)view->irradiance[i] : 0);
+        render_light_view_add_shadow(view, (int)(i % (size_t)view->size_px),
+                                     (int)(i / (size_t)view->size_px), (double)texel[3], cell->arriving);
     }
     return true;
 }
@@ -164,7 +166,8 @@ static bool append_cell(const struct render_light_target *targets, const struct 
         const double extent = (double)cell->max[k] - (double)cell->min[k];
         diagonal2 += extent * extent;
         sample.position_mm[k] = (float)(cell->moment[k] / cell->share);
-        sample.flux_w[k] = (float)(flux * view->rgb[k]);
+        sample.flux_w[k] =
+            (float)(flux * view->rgb[k] * (view->shadows ? cell->arriving[k] / cell->share : 1));
     }
     sample.footprint_mm = (float)sqrt(diagonal2);
     return append(targets[cell->object].samples, &sample, cell->code, status);

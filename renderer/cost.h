@@ -41,13 +41,15 @@
 #define RENDER_COST_MAP_EVALUATION 20.0   /* one texel of a map at one pixel              */
 #define RENDER_COST_DEFORMED_VERTEX 50.0  /* posed once for all passes                    */
 #define RENDER_COST_MOVED_VERTEX 40.0
-#define RENDER_COST_SKY_SAMPLE 400.0    /* of the environment: its patches cut and put together */
-#define RENDER_COST_HARMONIC 4.0        /* each harmonic of each patch's irradiance */
-#define RENDER_COST_HARMONIC_PIXEL 5.0  /* the same by a shader, both of an order m */
-#define RENDER_COST_RAY 400.0           /* through the scene's triangles            */
-#define RENDER_COST_TREE_TRIANGLE 500.0 /* of the tree that they are traced through */
-#define RENDER_COST_SCREEN_PIXEL 6.0    /* touched by a simple pass                     */
-#define RENDER_COST_POINTS_PIXEL 180.0  /* whose four points are looked at */
+#define RENDER_COST_SKY_SAMPLE 400.0      /* of the environment: its patches cut and put together */
+#define RENDER_COST_HARMONIC 4.0          /* each harmonic of each patch's irradiance */
+#define RENDER_COST_HARMONIC_PIXEL 5.0    /* the same by a shader, both of an order m */
+#define RENDER_COST_RAY 400.0             /* through the scene's triangles            */
+#define RENDER_COST_TREE_TRIANGLE 500.0   /* of the tree that they are traced through */
+#define RENDER_COST_BLOCKER_SURFACE 120.0 /* in one texel: listed, sorted, its curve made */
+#define RENDER_COST_SHADOW_TAP 20.0       /* of the search or of the filter */
+#define RENDER_COST_SCREEN_PIXEL 6.0      /* touched by a simple pass                     */
+#define RENDER_COST_POINTS_PIXEL 180.0    /* whose four points are looked at */
 
 /* What a shader takes with a GPU, of what llvmpipe takes: assumed, none was at hand. */
 #define RENDER_COST_GPU_SHARE 0.02

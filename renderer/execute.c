@@ -4,6 +4,7 @@
 #include "renderer/gather_draw.h"
 #include "renderer/geometry.h"
 #include "renderer/pose.h"
+#include "renderer/shadow_draw.h"
 #include "renderer/solid.h"
 #include "renderer/splat_draw.h"
 #include "renderer/tsm_draw.h"
@@ -18,7 +19,7 @@ enum {
     SAMPLES_PER_PIXEL = 4,
     PROGRAM_LIMIT = 64,
     TEXTURE_LIMIT = 56,
-    DEFINES_SIZE = 256,
+    DEFINES_SIZE = 512,
     REST_LOCATION = RENDER_VERTEX_ARRAYS, /* of a vertex's position at rest */
 };
 
@@ -65,6 +66,7 @@ struct render_executor {
     struct render_gatherer *gatherer;           /* NULL until light is first gathered */
     struct render_tsm *tsm;                     /* NULL until a shadow map is first gathered */
     struct render_sky *sky;                     /* NULL until an environment is first drawn */
+    struct render_shadower *shadower;           /* NULL until shadows of blockers are first drawn */
     struct render_buffer_texture object_buffer; /* of render_executor_fill_media     */
     struct render_buffer_texture roughness_buffer;
     float point_places[SAMPLES_PER_PIXEL][2]; /* of a pixel's points: 0 to 1 across it */
@@ -225,6 +227,7 @@ void render_executor_destroy(struct render_executor *executor)
     render_gatherer_destroy(executor->gatherer);
     render_tsm_destroy(executor->tsm);
     render_sky_destroy(executor->sky);
+    render_shadower_destroy(executor->shadower);
     render_buffer_texture_destroy(&executor->object_buffer);
     render_buffer_texture_destroy(&executor->roughness_buffer);
     glDeleteVertexArrays(1, &executor->empty_vertex_array);
@@ -336,6 +339,16 @@ static void texture_size(const struct render_plan *plan, const struct render_tex
         *width_px = *height_px = render_plan_map_side_px(plan);
     } else if (kind->size == RENDER_SIZE_PEEL) {
         *width_px = *height_px = plan->peel_side_px;
+    } else if (kind->size == RENDER_SIZE_LIGHT_BLOCKS) {
+        const int block_px = render_plan_shadow_block_px(plan);
+        int largest = 1;
+        for (size_t v = 0; v < plan->view_count; v++)
+            largest = plan->views[v].size_px > largest ? plan->views[v].size_px : largest;
+        *width_px = *height_px = (largest + block_px - 1) / block_px;
+    } else if (kind->size == RENDER_SIZE_SHADOW) {
+        *width_px = *height_px = plan->shadows.size_px;
+    } else if (kind->size == RENDER_SIZE_SHADOW_BLOCKS) {
+        *width_px = *height_px = (plan->shadows.size_px + RENDER_SHADOW_BLOCK - 1) / RENDER_SHADOW_BLOCK;
     } else if (kind->size == RENDER_SIZE_VERTICES) {
         *width_px = RENDER_VERTEX_ROW;
         *height_px = (int)((plan->vertex_count + RENDER_VERTEX_ROW - 1) / RENDER_VERTEX_ROW);
@@ -472,6 +485,21 @@ bool render_executor_need_sky(const struct render_frame *frame, struct render_sk
     return true;
 }
 
+bool render_executor_need_shadower(const struct render_frame *frame, struct render_shadower **shadower_out,
+                                   dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    if (!executor->shadower && !render_shadower_create(frame->request->scene, &executor->shadower, status))
+        return false;
+    *shadower_out = executor->shadower;
+    return true;
+}
+
+struct render_shadower *render_executor_shadower(const struct render_executor *executor)
+{
+    return executor->shadower;
+}
+
 struct render_sky *render_executor_sky(const struct render_executor *executor)
 {
     return executor->sky;
@@ -563,7 +591,8 @@ void render_set_points(const struct render_frame *frame)
 
 size_t render_executor_program_count(const struct render_executor *executor)
 {
-    return executor->program_count + (executor->pose_program != 0);
+    return executor->program_count + (executor->pose_program != 0) +
+           (executor->shadower && render_shadower_has_program(executor->shadower));
 }
 
 size_t render_executor_draw_count(const struct render_executor *executor, size_t effect)
@@ -656,7 +685,7 @@ static void set_state(const struct render_frame *frame, const struct render_pass
     glViewport(0, 0, width_px, height_px);
     /* What stands between the light and the object that a map is fitted to is in front of its near plane.
      */
-    (is_map ? glEnable : glDisable)(GL_DEPTH_CLAMP);
+    (is_map || target->size == RENDER_SIZE_SHADOW ? glEnable : glDisable)(GL_DEPTH_CLAMP);
     (pass->is_added || pass->is_blended ? glEnable : glDisable)(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     (pass->depth_written || pass->depth_tested ? glEnable : glDisable)(GL_DEPTH_TEST);
@@ -722,6 +751,8 @@ static bool draw(const struct render_frame *frame, const struct render_pass *pas
         return true;
     }
     for (size_t i = 0; i < frame->executor->mesh_count; i++) {
+        if (frame->view && frame->view->is_of_object && frame->view->object != i)
+            continue;
         (render_executor_hides_inside(frame, i) ? glEnable : glDisable)(GL_CULL_FACE);
         render_draw_object(frame, i);
     }

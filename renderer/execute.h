@@ -9,6 +9,7 @@ struct render_executor;
 struct render_splatter;
 struct render_gatherer;
 struct render_sky;
+struct render_shadower;
 struct render_tsm;
 
 /* What a pass sees when its bind or run function is called. */
@@ -102,8 +103,13 @@ DIPOLE_CHECKED bool render_executor_need_tsm(const struct render_frame *frame, s
 DIPOLE_CHECKED bool render_executor_need_sky(const struct render_frame *frame, struct render_sky **sky_out,
                                              dipole_status *status);
 
+DIPOLE_CHECKED bool render_executor_need_shadower(const struct render_frame *frame,
+                                                  struct render_shadower **shadower_out,
+                                                  dipole_status *status);
+
 /* What was made; NULL before. */
 struct render_tsm *render_executor_tsm(const struct render_executor *executor);
+struct render_shadower *render_executor_shadower(const struct render_executor *executor);
 struct render_sky *render_executor_sky(const struct render_executor *executor);
 
 /* Put the vertices of objects that are not at rest where the frame has them: those that are deformed, or

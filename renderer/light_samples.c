@@ -125,7 +125,7 @@ bool render_light_samples_add(struct render_light_samples *samples,
 static bool append_block(const struct reducer *reducer, struct block block, double extent_mm)
 {
     const struct render_light_view *const view = reducer->view;
-    double share = 0, irradiance = 0, moment[3] = { 0, 0, 0 };
+    double share = 0, irradiance = 0, moment[3] = { 0, 0, 0 }, arriving[3] = { 0, 0, 0 };
     int lit_count = 0;
     for (int y = block.y; y < block.y + block.height; y++) {
         for (int x = block.x; x < block.x + block.width; x++) {
@@ -138,6 +138,7 @@ static bool append_block(const struct reducer *reducer, struct block block, doub
                 irradiance += (double)view->irradiance[(size_t)y * (size_t)view->size_px + (size_t)x];
             for (int k = 0; k < 3; k++)
                 moment[k] += (double)t[3] * (double)t[k];
+            render_light_view_add_shadow(view, x, y, (double)t[3], arriving);
         }
     }
     if (!(share > 0))
@@ -149,6 +150,8 @@ static bool append_block(const struct reducer *reducer, struct block block, doub
         sample.position_mm[k] = (float)(moment[k] / share);
         sample.flux_w[k] =
             (float)((view->irradiance ? irradiance / lit_count : share) * factor * view->rgb[k]);
+        if (view->shadows)
+            sample.flux_w[k] *= (float)(arriving[k] / share);
     }
     return render_light_samples_add(reducer->targets[reducer->object].samples, &sample, reducer->status);
 }

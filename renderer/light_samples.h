@@ -37,9 +37,24 @@ struct render_light_view {
     double rgb[3];
     int levels;           /* texels are merged in blocks of 2^levels at most         */
     const float *rest_mm; /* of each texel, of four floats: its surface at rest; for cell_samples.h      */
-    double flux_factor;   /* 0: 1. Samples carry so much of the flux                               */
-    bool is_shifted;      /* blocks begin half of one before the view does                              */
+    const float *shadows; /* of blocks, four floats: part of each channel's power that arrives; NULL: all */
+    int shadow_block_px, shadow_side_px; /* texels a side of a block, and blocks a side              */
+    double flux_factor; /* 0: 1. Samples carry so much of the flux                               */
+    bool is_shifted;    /* blocks begin half of one before the view does                              */
 };
+
+/* Add what arrives of a texel's power share to that of each channel; nothing where the view has no shadows.
+ */
+static inline void render_light_view_add_shadow(const struct render_light_view *view, int x, int y,
+                                                double share, double arriving[3])
+{
+    if (!view->shadows)
+        return;
+    const size_t row = (size_t)(y / view->shadow_block_px), column = (size_t)(x / view->shadow_block_px);
+    const float *const shadow = view->shadows + 4 * (row * (size_t)view->shadow_side_px + column);
+    for (int k = 0; k < 3; k++)
+        arriving[k] += share * (double)shadow[k];
+}
 
 /* Where the samples of an object go, and how far apart they may be. NULL: it gets none. */
 struct render_light_target {

@@ -23,7 +23,10 @@ struct options {
     int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int environment_samples;
     const char *splat_grid;
-    double ambient_visibility; /* rays */
+    double ambient_visibility;       /* rays */
+    double light_points;             /* 0: the usual number */
+    int shadow_nodes;                /* index */
+    double shadow_taps, shadow_side; /* 0: the usual number */
     int size_px[2];
     int frames[2]; /* first and last; -1 when not given */
     bool is_explained, is_viewed;
@@ -50,6 +53,10 @@ static const char *const layer_count_names[] = { "0", "2", "4", "6", "8", "10", 
 
 /* Index 0: the usual number, or whatever the volumes of a folder have. */
 static const char *const sample_count_names[] = { "usual", "13", "21", "53", "117", "245", NULL };
+/* Index 0: the usual number. */
+static const char *const node_count_names[] = { "usual", "4", "8", "16", "exact", NULL };
+static const int node_counts[] = { 0, 4, 8, 16, INT_MAX };
+
 static const int sample_counts[] = { 0, 13, 21, 53, 117, 245 };
 
 /* ---- results ------------------------------------------------------------------------------------ */
@@ -332,6 +339,10 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                                     .environment_samples =
                                         (enum render_environment_samples)options->environment_samples,
                                     .ambient_visibility = (int)options->ambient_visibility,
+                                    .light_place_count = (int)options->light_points,
+                                    .shadows = { .node_limit = node_counts[options->shadow_nodes],
+                                                 .tap_count = (int)options->shadow_taps,
+                                                 .side_px = (int)options->shadow_side },
                                     .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
                                              .response = (enum render_tsm_response)options->tsm_response,
                                              .part = (enum render_tsm_part)options->tsm_part,
@@ -390,6 +401,16 @@ static bool check_usage(const struct options *options, dipole_status *status)
           "--ambient-visibility is not a whole number of rays" },
         { options->ambient_visibility > 0 && !has_samples && !is_reference && !options->is_viewed,
           "--ambient-visibility is of --technique gather, splat and reference alone" },
+        { options->shadow_taps != floor(options->shadow_taps),
+          "--shadow-taps is not a whole number of taps" },
+        { options->shadow_side != floor(options->shadow_side),
+          "--shadow-side is not a whole number of texels" },
+        { (options->shadow_nodes || options->shadow_taps > 0 || options->shadow_side > 0) && is_reference,
+          "--shadow-nodes, --shadow-taps and --shadow-side are not of --technique reference, which is "
+          "exact" },
+        { options->light_points != floor(options->light_points),
+          "--light-points is not a whole number of points" },
+        { options->light_points > 0 && !is_reference, "--light-points is of --technique reference alone" },
         { has_tsm_options && technique != RENDER_TECHNIQUE_TSM && !options->is_viewed,
           "--tsm, --tsm-response, --tsm-part, --tsm-samples and --peel are of --technique tsm alone" },
     };
@@ -505,6 +526,36 @@ int main(int argc, char **argv)
                   "default 0: nothing does.",
           .min = 0,
           .max = 4096 },
+        { .name = "shadow-nodes",
+          .kind = CLI_CHOICE,
+          .target = &options.shadow_nodes,
+          .argument = "N",
+          .help = "Depths in a texel at which light through blockers is known: 4, 8, the default, 16, or "
+                  "exact.",
+          .choices = node_count_names },
+        { .name = "shadow-taps",
+          .kind = CLI_NUMBER,
+          .target = &options.shadow_taps,
+          .argument = "N",
+          .help = "Taps that look for what blocks a light with a size, and as many that filter, 1 to 1024; "
+                  "default 25.",
+          .min = 1,
+          .max = RENDER_SHADOW_TAP_LIMIT },
+        { .name = "shadow-side",
+          .kind = CLI_NUMBER,
+          .target = &options.shadow_side,
+          .argument = "N",
+          .help = "Texels a side of the maps that shadows of blockers are looked up in, 16 to 2048; "
+                  "default 1024.",
+          .min = 16,
+          .max = RENDER_SHADOW_SIDE_LIMIT },
+        { .name = "light-points",
+          .kind = CLI_NUMBER,
+          .target = &options.light_points,
+          .argument = "N",
+          .help = "Points that the reference takes a light with a size for, 1 to 4096; default 128.",
+          .min = 1,
+          .max = RENDER_LIGHT_PLACE_LIMIT },
         { .name = "epsilon",
           .letter = 'e',
           .kind = CLI_NUMBER,

@@ -348,6 +348,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_choose_cells(request, plan);
         done = render_plan_light_from_around(request, plan, status) &&
                render_plan_make_views(request, plan, status) &&
+               render_plan_make_shadows(request, plan, status) &&
                render_plan_make_maps(request, plan, status);
     }
     if (done) {
@@ -376,6 +377,7 @@ void render_plan_destroy(struct render_plan *plan)
     free(plan->objects);
     free(plan->of_medium);
     free(plan->views);
+    free(plan->shadows.of_view);
     free(plan->maps);
     free(plan->passes);
     free(plan);

@@ -19,6 +19,7 @@ struct render_request {
     const struct render_table *tables;    /* one for each medium; NULL: baked to the plan's table_epsilon */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps            */
     struct render_tsm_options tsm;
+    struct render_shadow_options shadows;
     const struct render_environment *environment; /* the scene's, if it has one; NULL: read for this plan */
     enum render_environment_samples environment_samples;
     int ambient_visibility;
@@ -47,10 +48,11 @@ enum { RENDER_PASS_READS = 10, RENDER_PASS_WRITES = 4, RENDER_PASS_EXTRAS = 3, R
 struct render_pass {
     const char *name; /* also of its shaders: NAME.vert or fullscreen.vert, NAME.frag */
     enum render_draw_kind draw;
-    bool is_per_view; /* once for each of the lights' views        */
-    bool is_per_map;  /* once for each translucent shadow map      */
-    bool is_added;    /* to what the target holds, else replaces it */
-    bool is_blended;  /* draws add up, on a target that was cleared         */
+    bool is_per_view;   /* once for each of the lights' views        */
+    bool is_per_map;    /* once for each translucent shadow map      */
+    bool is_of_samples; /* per view: also for views that are repeated for other objects */
+    bool is_added;      /* to what the target holds, else replaces it */
+    bool is_blended;    /* draws add up, on a target that was cleared         */
     const char *reads[RENDER_PASS_READS];
     const char *reads_if_written[RENDER_PASS_READS]; /* shader sees HAS_<NAME>        */
     const char *writes[RENDER_PASS_WRITES];
@@ -93,7 +95,11 @@ enum render_size {
     RENDER_SIZE_LIGHT_VIEW,
     RENDER_SIZE_MAP,
     RENDER_SIZE_VERTICES,
-    RENDER_SIZE_PEEL
+    RENDER_SIZE_PEEL,
+    RENDER_SIZE_SHADOW,
+    RENDER_SIZE_LIGHT_BLOCKS,  /* a texel for each block of a light's view, render_plan_shadow_block_px a
+                                  side */
+    RENDER_SIZE_SHADOW_BLOCKS, /* a texel for each block of them, RENDER_SHADOW_BLOCK a side */
 };
 
 /* Width of textures with a texel for each vertex of the scene. */
@@ -120,7 +126,28 @@ struct render_plan_view {
     int size_px;
     int levels;        /* blocks of 2^levels texels are at most spacing wide */
     double texel_area; /* mm^2; perspective: at distance 1                  */
-    size_t object;     /* of translucent shadow maps: whose light it holds  */
+    size_t object;     /* of translucent shadow maps, and where is_of_object: whose light it holds */
+    bool is_of_object; /* shows that object alone; others do not hide it       */
+    bool is_repeated;  /* the view before is of the same light: passes that are not of samples are done */
+};
+
+/* What shadows of one of the lights' views are looked up in. theory.md T67. */
+struct render_plan_shadow {
+    struct render_projection projection;
+    int size_px;
+    double nearest_mm; /* along the axis: nothing that blocks is nearer to the light */
+    double
+        light_size; /* point: diameter in mm; parallel: of its disc at distance 1; 0: it has no penumbras */
+};
+
+enum { RENDER_SHADOW_BLOCK = 16 };
+
+/* What blocks light, of lights that shine; all 0 in a scene with neither blockers nor such lights. */
+struct render_plan_shadows {
+    bool is_called_for; /* else the lights' views do for shadows */
+    size_t blocker_count, translucent_count, coloured_count, soft_light_count, spot_count, triangle_count;
+    int node_limit, tap_count, size_px;
+    struct render_plan_shadow *of_view; /* NULL: not called for */
 };
 
 struct render_plan_pass {
@@ -209,6 +236,7 @@ struct render_plan {
     struct render_plan_view *maps; /* translucent shadow maps: of each light and visible object */
     size_t map_count;
     struct render_tsm_options tsm;
+    struct render_plan_shadows shadows;
     size_t vertex_count; /* of the scene, when the maps are gathered at vertices */
     struct render_plan_pass *passes;
     size_t pass_count;
@@ -225,6 +253,10 @@ void render_plan_destroy(struct render_plan *plan);
 /* Fails for an epsilon out of range, a picture that is too large, or too many lights. */
 DIPOLE_CHECKED bool render_plan_check_request(const struct io_scene *scene, double epsilon,
                                               dipole_status *status);
+
+/* Texels a side of a block of the lights' views whose shadow is looked up once: at most half as wide as
+ * light samples are apart. */
+int render_plan_shadow_block_px(const struct render_plan *plan);
 
 /* Whether a light is not black. */
 bool render_light_shines(const struct io_light *light);

@@ -42,6 +42,10 @@ void render_plan_settle_grid(struct render_plan *plan, size_t medium, double tex
 DIPOLE_CHECKED bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,
                                            dipole_status *status);
 
+/* plan_shadows.c: once there are views. */
+DIPOLE_CHECKED bool render_plan_make_shadows(const struct render_request *request, struct render_plan *plan,
+                                             dipole_status *status);
+
 /* plan_tsm.c: the maps of technique tsm, the pattern of each medium, and what is known of the error. Fails
  * also for options that contradict each other, and for volumes of other media. */
 DIPOLE_CHECKED bool render_plan_make_maps(const struct render_request *request, struct render_plan *plan,

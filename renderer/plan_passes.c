@@ -24,7 +24,8 @@ static const struct render_texture textures[] = {
     { .name = "light_view", .size = RENDER_SIZE_LIGHT_VIEW, .is_far_where_empty = true },
     { .name = "light_object", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW },     /* object + 1  */
     { .name = "light_irradiance", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW }, /* per rgb */
-    { .name = "light_rest", .size = RENDER_SIZE_LIGHT_VIEW }, /* the surface at rest, mm */
+    { .name = "light_rest", .size = RENDER_SIZE_LIGHT_VIEW },     /* the surface at rest, mm */
+    { .name = "light_shadow", .size = RENDER_SIZE_LIGHT_BLOCKS }, /* left of the light, per channel */
     { .name = "light_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_LIGHT_VIEW },
     { .name = "light_samples", .format = RENDER_OTHER },
     { .name = "posed_vertices", .format = RENDER_OTHER }, /* stands for the objects' vertices */
@@ -47,6 +48,14 @@ static const struct render_texture textures[] = {
     { .name = "peel_position_mm", .size = RENDER_SIZE_PEEL }, /* w = object + 1                       */
     { .name = "peel_normal", .size = RENDER_SIZE_PEEL },      /* w = cosine of the facet to the axis  */
     { .name = "peel_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_PEEL },
+    { .name = "shadow_depth_mm", .format = RENDER_R32F, .size = RENDER_SIZE_SHADOW }, /* 0: none */
+    { .name = "shadow_order", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_SHADOW },
+    { .name = "avsm_ranges", .format = RENDER_OTHER }, /* depths, nodes of each texel: shadow_draw.c */
+    { .name = "avsm_nodes", .format = RENDER_OTHER },
+    { .name = "avsm_colour", .format = RENDER_OTHER }, /* stands for nodes of three channels         */
+    { .name = "shadow_taps", .format = RENDER_OTHER },
+    { .name = "shadow_nearest", .format = RENDER_R32F, .size = RENDER_SIZE_SHADOW_BLOCKS },
+    { .name = "shadow" },      /* left of one view's light, per channel                               */
     { .name = "overlap_sum" }, /* irradiance times R_d, summed; a = how many samples                 */
     { .name = "radiosity" },   /* W/mm^2                                                              */
     { .name = "specular" },    /* radiance, already averaged over the pixel                           */
@@ -179,6 +188,8 @@ static void repeat_rows(struct render_plan *plan, const struct render_plan_pass 
     const size_t repeats = pass->is_per_view ? plan->view_count : pass->is_per_map ? plan->map_count : 1;
     for (size_t view = 0; view < repeats; view++) {
         for (size_t i = begin; i < end; i++) {
+            if (rows[i].pass->is_per_view && plan->views[view].is_repeated && !rows[i].pass->is_of_samples)
+                continue;
             plan->passes[plan->pass_count] = rows[i];
             plan->passes[plan->pass_count++].view = view;
         }

@@ -116,13 +116,14 @@ static void add_specular_row(void *context, int y)
     struct render_pixel pixel;
     for (int x = 0; x < width_px; x++) {
         float *const rgba = reference->image->pixels + 4 * ((size_t)y * (size_t)width_px + (size_t)x);
+        uint64_t number = ((uint64_t)y * (uint64_t)width_px + (uint64_t)x) * RENDER_PIXEL_RAYS;
         double radiance[3] = { 0 };
         if (!(rgba[3] > 0))
             continue;
         render_pixel_trace(&reference->view, x, y, &pixel);
         for (int g = 0; g < pixel.group_count; g++) {
-            for (int i = 0; i < pixel.groups[g].count; i++)
-                render_pixel_add_specular(&reference->view, &pixel.groups[g].points[i], radiance);
+            for (int i = 0; i < pixel.groups[g].count; i++, number++)
+                render_pixel_add_specular(&reference->view, &pixel.groups[g].points[i], number, radiance);
         }
         for (int c = 0; c < 3; c++)
             rgba[c] += (float)(radiance[c] / RENDER_PIXEL_RAYS);
@@ -502,6 +503,9 @@ static bool begin(struct reference *reference, dipole_status *status)
     reference->view = (struct render_pixel_view){
         .scene = scene,
         .tracer = reference->tracer,
+        .light_place_count = reference->options->light_place_count > 0
+                                 ? reference->options->light_place_count
+                                 : RENDER_LIGHT_PLACES,
         .media = reference->pixel_media,
         .width_px = scene->camera.width_px,
         .height_px = scene->camera.height_px,

@@ -1,5 +1,6 @@
 #include "renderer/reference_pixel.h"
 
+#include "renderer/area_light.h"
 #include "renderer/plan.h"
 
 #include <math.h>
@@ -87,9 +88,10 @@ double render_pixel_exit_per_sr(const struct render_pixel_view *view,
 }
 
 bool render_light_reaches(const struct render_tracer *tracer, const struct io_light *light,
-                          const struct render_surface_point *point, double to_light[3], double *falloff_out)
+                          const struct render_surface_point *point, double to_light[3], double *falloff_out,
+                          double left[IO_CHANNEL_COUNT])
 {
-    double away_mm = INFINITY;
+    double away_mm = INFINITY, onward[3];
     *falloff_out = 1;
     for (int k = 0; k < 3; k++)
         to_light[k] = -light->direction[k];
@@ -99,8 +101,51 @@ bool render_light_reaches(const struct render_tracer *tracer, const struct io_li
             to_light[k] = (light->position_mm[k] - point->position_mm[k]) / away_mm;
         *falloff_out = 1 / (away_mm * away_mm);
     }
-    return render_dot(point->facet_normal, to_light) > 0 &&
-           render_tracer_is_clear(tracer, point->position_mm, point->facet_normal, to_light, away_mm);
+    for (int k = 0; k < 3; k++)
+        onward[k] = -to_light[k];
+    *falloff_out *= render_light_spot_part(light, onward);
+    if (!(render_dot(point->facet_normal, to_light) > 0) || !(*falloff_out > 0) ||
+        !render_tracer_is_clear(tracer, point->position_mm, point->facet_normal, to_light, away_mm))
+        return false;
+    render_tracer_left(tracer, point->position_mm, to_light, away_mm, left);
+    return true;
+}
+
+/* So many places of a light does one point take; points near it take others. */
+enum { PLACES_EACH = 8 };
+
+int render_light_places(const struct io_light *light)
+{
+    return render_light_has_size(light) ? PLACES_EACH : 1;
+}
+
+/* Neighbours on the list of places are spread over the disc by steps of the golden section. */
+struct io_light render_light_place_of(const struct io_light *light,
+                                      const struct render_surface_point *point, uint64_t number, int index,
+                                      int place_count)
+{
+    const int places = render_light_places(light);
+    const uint64_t step = (uint64_t)(0.618 * place_count) | 1;
+    const uint64_t at = (number * (uint64_t)places + (uint64_t)index) * step % (uint64_t)place_count;
+    struct io_light place = render_light_place(light, point->position_mm, (int)at, place_count);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        place.rgb[c] /= places;
+    return place;
+}
+
+void render_light_left(const struct render_tracer *tracer, const struct io_light *light,
+                       const struct render_surface_point *point, int count, double left[IO_CHANNEL_COUNT])
+{
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        left[c] = 0;
+    for (int i = 0; i < count; i++) {
+        const struct io_light place = render_light_place(light, point->position_mm, i, count);
+        double to_light[3], falloff, once[IO_CHANNEL_COUNT];
+        if (!render_light_reaches(tracer, &place, point, to_light, &falloff, once))
+            continue;
+        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+            left[c] += once[c] / count;
+    }
 }
 
 /* f cosine of GGX with the height-correlated Smith term; alpha: roughness. specular.frag has the same. */
@@ -133,20 +178,30 @@ static double mirrored_per_sr(const struct render_pixel_view *view,
                cosine_in, cosine_out);
 }
 
+static void add_mirrored(const struct render_pixel_view *view, const struct io_light *light,
+                         const struct render_surface_point *point, double radiance[3])
+{
+    double to_light[3], falloff, left[IO_CHANNEL_COUNT];
+    if (!render_light_reaches(view->tracer, light, point, to_light, &falloff, left))
+        return;
+    const double mirrored = falloff * mirrored_per_sr(view, point, to_light);
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        radiance[c] += light->rgb[c] * left[c] * mirrored;
+}
+
 void render_pixel_add_specular(const struct render_pixel_view *view,
-                               const struct render_surface_point *point, double radiance[3])
+                               const struct render_surface_point *point, uint64_t number,
+                               double radiance[3])
 {
     if (!view->scene->objects[point->object].has_specular)
         return;
     for (size_t i = 0; i < view->scene->light_count; i++) {
         const struct io_light *const light = &view->scene->lights[i];
-        double to_light[3], falloff;
-        if (!render_light_shines(light) ||
-            !render_light_reaches(view->tracer, light, point, to_light, &falloff))
-            continue;
-        const double mirrored = falloff * mirrored_per_sr(view, point, to_light);
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            radiance[c] += light->rgb[c] * mirrored;
+        for (int p = 0; p < render_light_places(light) && render_light_shines(light); p++) {
+            const struct io_light place =
+                render_light_place_of(light, point, number, p, view->light_place_count);
+            add_mirrored(view, &place, point, radiance);
+        }
     }
 }
 

@@ -178,30 +178,40 @@ static double random_of(uint64_t a, uint64_t b)
     return (double)((x ^ (x >> 31)) >> 11) * 0x1p-53;
 }
 
-/* Power that enters at a point for so much area. Facets catch the light, smooth normals mirror a part of
- * it, as in a light's view (T13): irradiance falls with the facet's cosine. */
+/* Power of one light without a size that enters at a point for so much area. Facets catch the light, smooth
+ * normals mirror a part of it, as in a light's view (T13): irradiance falls with the facet's cosine. */
+static void add_light(const struct render_sum *sum, const struct io_light *light,
+                      const struct render_surface_point *point, double area_mm2,
+                      double flux_w[IO_CHANNEL_COUNT])
+{
+    double to_light[3], falloff, left[IO_CHANNEL_COUNT];
+    if (!render_light_reaches(sum->view->tracer, light, point, to_light, &falloff, left))
+        return;
+    const double cosine = fmin(fmax(render_dot(point->normal, to_light), 0), 1);
+    const double entering = falloff * render_dot(point->facet_normal, to_light) *
+                            (1 - dipole_fresnel_reflectance(sum->view->media[point->object].eta, cosine));
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        flux_w[c] += area_mm2 * light->rgb[c] * left[c] * entering;
+}
+
+/* number: of the point, the same in every run. */
 static void light_point(const struct render_sum *sum, const struct render_surface_point *point,
-                        double area_mm2, double flux_w[IO_CHANNEL_COUNT])
+                        uint64_t number, double area_mm2, double flux_w[IO_CHANNEL_COUNT])
 {
     const struct io_scene *const scene = sum->view->scene;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
         flux_w[c] = 0;
     for (size_t i = 0; i < scene->light_count; i++) {
         const struct io_light *const light = &scene->lights[i];
-        double to_light[3], falloff;
-        if (!render_light_shines(light) ||
-            !render_light_reaches(sum->view->tracer, light, point, to_light, &falloff))
-            continue;
-        const double cosine = fmin(fmax(render_dot(point->normal, to_light), 0), 1);
-        const double entering =
-            falloff * render_dot(point->facet_normal, to_light) *
-            (1 - dipole_fresnel_reflectance(sum->view->media[point->object].eta, cosine));
-        for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-            flux_w[c] += area_mm2 * light->rgb[c] * entering;
+        for (int p = 0; p < render_light_places(light) && render_light_shines(light); p++) {
+            const struct io_light place =
+                render_light_place_of(light, point, number, p, sum->view->light_place_count);
+            add_light(sum, &place, point, area_mm2, flux_w);
+        }
     }
 }
 
-/* Light from all around enters, too, by the smooth normal. number: of the point, the same in every run. */
+/* Light from all around enters, too, by the smooth normal. */
 static void light_from_around(const struct render_sum *sum, const struct render_surface_point *point,
                               uint64_t number, double area_mm2, double flux_w[IO_CHANNEL_COUNT])
 {
@@ -238,7 +248,7 @@ static void take_part(void *context, int part)
             for (int k = 0; k < 3; k++)
                 sample->position_mm[k] = point.position_mm[k];
             if (profile_of(sum, point.object))
-                light_point(sum, &point, area_mm2, sample->flux_w);
+                light_point(sum, &point, 2 * number + (uint64_t)half, area_mm2, sample->flux_w);
             if (profile_of(sum, point.object) && sum->sky.environment)
                 light_from_around(sum, &point, 2 * number + (uint64_t)half, area_mm2, sample->flux_w);
         }

@@ -1,5 +1,7 @@
 #include "renderer/reference_trace.h"
 
+#include "renderer/blocker.h"
+#include "renderer/crossings.h"
 #include "renderer/projection.h"
 
 #include <embree3/rtcore.h>
@@ -20,8 +22,9 @@
 struct render_tracer {
     const struct io_scene *scene;
     RTCDevice device;
-    RTCScene triangles; /* geometry i is object i */
-    double lift_mm;
+    RTCScene triangles;       /* geometry i is object i */
+    RTCScene blockers;        /* geometry i is blocker i; NULL: there are none */
+    double lift_mm, reach_mm; /* reach: no longer is what holds all blockers */
 };
 
 static bool check(const struct render_tracer *tracer, const char *what, dipole_status *status)
@@ -36,8 +39,8 @@ static bool check(const struct render_tracer *tracer, const char *what, dipole_s
     }
 }
 
-static bool add_object(struct render_tracer *tracer, const struct io_mesh *mesh, unsigned index,
-                       dipole_status *status)
+static bool add_object(struct render_tracer *tracer, RTCScene triangles, const struct io_mesh *mesh,
+                       unsigned index, dipole_status *status)
 {
     const RTCGeometry geometry = rtcNewGeometry(tracer->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     float *const vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -48,10 +51,48 @@ static bool add_object(struct render_tracer *tracer, const struct io_mesh *mesh,
         memcpy(vertices, mesh->positions, 3 * mesh->vertex_count * sizeof *vertices);
         memcpy(indices, mesh->indices, 3 * mesh->triangle_count * sizeof *indices);
         rtcCommitGeometry(geometry);
-        rtcAttachGeometryByID(tracer->triangles, geometry, index);
+        rtcAttachGeometryByID(triangles, geometry, index);
     }
     rtcReleaseGeometry(geometry);
     return check(tracer, "a mesh", status);
+}
+
+static bool add_particles(struct render_tracer *tracer, const struct io_blocker *particles, unsigned index,
+                          dipole_status *status)
+{
+    const RTCGeometry geometry = rtcNewGeometry(tracer->device, RTC_GEOMETRY_TYPE_DISC_POINT);
+    float *const discs = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
+                                                 4 * sizeof(float), particles->mesh->vertex_count);
+    if (discs) {
+        for (size_t i = 0; i < particles->mesh->vertex_count; i++) {
+            memcpy(discs + 4 * i, particles->mesh->positions + 3 * i, 3 * sizeof *discs);
+            discs[4 * i + 3] = (float)particles->particle_mm;
+        }
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometryByID(tracer->blockers, geometry, index);
+    }
+    rtcReleaseGeometry(geometry);
+    return check(tracer, "particles", status);
+}
+
+static bool add_blockers(struct render_tracer *tracer, dipole_status *status)
+{
+    const struct io_scene *const scene = tracer->scene;
+    tracer->blockers = rtcNewScene(tracer->device);
+    rtcSetSceneFlags(tracer->blockers, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    bool done = check(tracer, "a scene", status);
+    for (size_t i = 0; done && i < scene->blocker_count; i++) {
+        const struct io_blocker *const blocker = &scene->blockers[i];
+        done = blocker->particle_mm > 0
+                   ? add_particles(tracer, blocker, (unsigned)i, status)
+                   : add_object(tracer, tracer->blockers, blocker->mesh, (unsigned)i, status);
+        for (int k = 0; k < 3; k++)
+            tracer->reach_mm +=
+                (double)blocker->mesh->max[k] - (double)blocker->mesh->min[k] + 2 * blocker->particle_mm;
+    }
+    if (done)
+        rtcCommitScene(tracer->blockers);
+    return done && check(tracer, "a tree", status);
 }
 
 bool render_tracer_create(const struct io_scene *scene, struct render_tracer **tracer_out,
@@ -75,11 +116,13 @@ bool render_tracer_create(const struct io_scene *scene, struct render_tracer **t
         done = check(tracer, "a scene", status);
     }
     for (size_t i = 0; done && i < scene->object_count; i++)
-        done = add_object(tracer, scene->objects[i].mesh, (unsigned)i, status);
+        done = add_object(tracer, tracer->triangles, scene->objects[i].mesh, (unsigned)i, status);
     if (done) {
         rtcCommitScene(tracer->triangles);
         done = check(tracer, "a tree", status);
     }
+    if (done && scene->blocker_count > 0)
+        done = add_blockers(tracer, status);
     if (done)
         *tracer_out = tracer;
     else
@@ -93,6 +136,8 @@ void render_tracer_destroy(struct render_tracer *tracer)
         return;
     if (tracer->triangles)
         rtcReleaseScene(tracer->triangles);
+    if (tracer->blockers)
+        rtcReleaseScene(tracer->blockers);
     if (tracer->device)
         rtcReleaseDevice(tracer->device);
     free(tracer);
@@ -171,4 +216,96 @@ bool render_tracer_is_clear(const struct render_tracer *tracer, const double pos
     struct RTCRay ray = ray_of(origin_mm, direction, distance_mm);
     rtcOccluded1(tracer->triangles, &context, &ray);
     return ray.tfar > 0; /* -infinity: something is hit */
+}
+
+/* ---- blockers ------------------------------------------------------------------------------------ */
+
+enum { FEW_CROSSINGS = 256 };
+
+/* All crossings of one ray, in any order; depth is along the ray. */
+struct crossing_list {
+    struct RTCIntersectContext context; /* first: Embree hands it back */
+    const struct io_scene *scene;
+    struct render_crossing *crossings, few[FEW_CROSSINGS];
+    size_t count, capacity;
+    bool is_short; /* of memory */
+};
+
+static void add_crossing(struct crossing_list *list, const struct render_crossing *crossing)
+{
+    if (list->count == list->capacity) {
+        struct render_crossing *const grown = malloc(2 * list->capacity * sizeof *grown);
+        list->is_short |= !grown;
+        if (!grown)
+            return;
+        memcpy(grown, list->crossings, list->count * sizeof *grown);
+        if (list->crossings != list->few)
+            free(list->crossings);
+        list->crossings = grown;
+        list->capacity *= 2;
+    }
+    list->crossings[list->count++] = *crossing;
+}
+
+/* Embree's filter: every hit is noted, and none ends the ray. */
+static void note_crossing(const struct RTCFilterFunctionNArguments *arguments)
+{
+    struct crossing_list *const list = (struct crossing_list *)arguments->context;
+    if (arguments->valid[0] == 0)
+        return;
+    /* of one ray at a time: then these are what single rays and hits are */
+    const struct RTCRay *const ray = (const struct RTCRay *)arguments->ray;
+    const struct RTCHit *const hit = (const struct RTCHit *)arguments->hit;
+    const float facing = hit->Ng_x * ray->dir_x + hit->Ng_y * ray->dir_y + hit->Ng_z * ray->dir_z;
+    /* the ray goes toward the light, against it */
+    add_crossing(list, &(struct render_crossing){
+                           .depth_mm = -ray->tfar, .blocker = hit->geomID, .is_entry = facing > 0 });
+    arguments->valid[0] = 0;
+}
+
+/* What a segment leaves before the receiver's depth. */
+static void take_segment(const struct render_segment *segment, double receiver_mm,
+                         double left[IO_CHANNEL_COUNT])
+{
+    const double length_mm = segment->ze_mm - segment->z0_mm;
+    if (segment->z0_mm >= receiver_mm)
+        return;
+    const double part = segment->ze_mm > receiver_mm ? (receiver_mm - segment->z0_mm) / length_mm : 1;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        left[c] *= 1 - segment->alpha[c] * render_blocker_part(segment->alpha[c], part);
+}
+
+/* The ray begins behind the point, where no blocker is, so that each that holds the point is seen whole. */
+void render_tracer_left(const struct render_tracer *tracer, const double position_mm[3],
+                        const double direction[3], double distance_mm, double left[IO_CHANNEL_COUNT])
+{
+    struct crossing_list list = { .scene = tracer->scene, .capacity = FEW_CROSSINGS };
+    struct render_segment few[FEW_CROSSINGS], *segments = few;
+    double origin_mm[3];
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        left[c] = 1;
+    if (!tracer->blockers)
+        return;
+    list.crossings = list.few;
+    for (int k = 0; k < 3; k++)
+        origin_mm[k] = position_mm[k] - tracer->reach_mm * direction[k];
+    rtcInitIntersectContext(&list.context);
+    list.context.filter = note_crossing;
+    struct RTCRay ray = ray_of(origin_mm, direction, tracer->reach_mm + distance_mm);
+    rtcOccluded1(tracer->blockers, &list.context, &ray);
+    if (list.count > FEW_CROSSINGS)
+        segments = malloc(list.count * sizeof *segments);
+    if (segments && !list.is_short) {
+        const size_t count = render_crossings_pair(
+            tracer->scene->blockers, list.crossings, list.count,
+            isfinite(distance_mm) ? -(tracer->reach_mm + distance_mm) : INFINITY, 1, segments);
+        for (size_t i = 0; i < count; i++)
+            take_segment(&segments[i], -tracer->reach_mm, left);
+    } else {
+        memset(left, 0, IO_CHANNEL_COUNT * sizeof *left);
+    }
+    if (segments != few)
+        free(segments);
+    if (list.crossings != list.few)
+        free(list.crossings);
 }

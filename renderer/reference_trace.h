@@ -21,4 +21,11 @@ bool render_tracer_find(const struct render_tracer *tracer, const double origin_
 bool render_tracer_is_clear(const struct render_tracer *tracer, const double position_mm[3],
                             const double facet_normal[3], const double direction[3], double distance_mm);
 
+/* What the scene's blockers leave of light that goes along -direction (a unit vector) to a point, per
+ * channel, from distance_mm away (INFINITY: from the end); exact but for float's rounding of where they
+ * are. theory.md T66. For any number of threads at once; without memory for more than some hundred blockers
+ * along a ray, nothing is left. */
+void render_tracer_left(const struct render_tracer *tracer, const double position_mm[3],
+                        const double direction[3], double distance_mm, double left[IO_CHANNEL_COUNT]);
+
 #endif

@@ -221,6 +221,7 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .tables = options->tables,
         .volumes = options->volumes,
         .tsm = options->tsm,
+        .shadows = options->shadows,
         .environment_samples = options->environment_samples,
         .ambient_visibility = options->ambient_visibility,
         .is_tone_mapped = options->is_tone_mapped,

@@ -83,6 +83,9 @@ enum { RENDER_SIDE_LIMIT = 16384 };
  * lights' views have, unless there are very many lights. */
 #define RENDER_LIGHT_SAMPLE_LIMIT ((size_t)1 << 25)
 
+/* Points that the reference takes a light with a size for. */
+enum { RENDER_LIGHT_PLACES = 128, RENDER_LIGHT_PLACE_LIMIT = 4096 };
+
 /* Draws one scene, any number of times. End it with render_destroy. */
 struct renderer;
 
@@ -142,6 +145,20 @@ struct render_tsm_options {
 };
 enum { RENDER_TSM_LAYER_LIMIT = 16, RENDER_TSM_USUAL_SAMPLES = 21 };
 
+/* Of scenes with blockers or lights with a size alone. */
+struct render_shadow_options {
+    int node_limit; /* of a texel's transmittance: 0: RENDER_SHADOW_NODES; INT_MAX: all there are */
+    int tap_count;  /* of the search and of the filter each; 0: RENDER_SHADOW_TAPS */
+    int side_px;    /* of the maps; 0: RENDER_SHADOW_SIDE */
+};
+enum {
+    RENDER_SHADOW_NODES = 8,
+    RENDER_SHADOW_TAPS = 25,
+    RENDER_SHADOW_TAP_LIMIT = 1024,
+    RENDER_SHADOW_SIDE = 1024,
+    RENDER_SHADOW_SIDE_LIMIT = 2048
+};
+
 struct render_options {
     enum render_technique technique;
     double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
@@ -152,6 +169,7 @@ struct render_options {
     const struct render_table *tables;    /* one for each of the scene's media; NULL: baked in memory */
     const struct lut_tsm *const *volumes; /* the same of translucent shadow maps                   */
     struct render_tsm_options tsm;
+    struct render_shadow_options shadows;
     enum render_environment_samples environment_samples;
     int ambient_visibility; /* rays from each sample of the environment's light; 0: nothing hides it */
     bool is_tone_mapped;    /* 0..1 over the scene's background, for a PNG; else
@@ -159,11 +177,12 @@ struct render_options {
 
     /* Of the reference alone. */
     struct render_progress progress;
-    int thread_count;    /* 0: as many as processors; the picture does not depend on it */
-    size_t sample_limit; /* 0: RENDER_REFERENCE_SAMPLE_LIMIT                            */
+    int thread_count;      /* 0: as many as processors; the picture does not depend on it */
+    size_t sample_limit;   /* 0: RENDER_REFERENCE_SAMPLE_LIMIT                            */
+    int light_place_count; /* points that a light with a size is taken for; 0: RENDER_LIGHT_PLACES */
 };
 
-enum { RENDER_EFFECT_LIMIT = 32, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
+enum { RENDER_EFFECT_LIMIT = 40, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
 
 /* One step of the reference: surface samples so far, and the error estimated from them. */
 struct render_doubling {

@@ -102,11 +102,10 @@ void render_splatter_drop_samples(struct render_splatter *splatter)
 
 /* ---- samples ------------------------------------------------------------------------------------ */
 
-/* Read a texture of the light's view back; NULL: no memory. */
-static float *read_view(const struct render_frame *frame, const char *texture, GLenum format,
-                        size_t components)
+/* Read the corner of a texture that a light's view of such a size has used back; NULL: no memory. */
+static float *read_part(const struct render_frame *frame, const char *texture, GLsizei size_px,
+                        GLenum format, size_t components)
 {
-    const GLsizei size_px = frame->view->size_px;
     const size_t size = (size_t)size_px * (size_t)size_px * components * sizeof(float);
     float *const texels = malloc(size);
     if (texels)
@@ -146,6 +145,37 @@ static bool draw_picture(const struct render_frame *frame, float **texels_out, f
     }
     free(meshes);
     return *texels_out != NULL;
+}
+
+static float *read_view(const struct render_frame *frame, const char *texture, GLenum format,
+                        size_t components)
+{
+    return read_part(frame, texture, frame->view->size_px, format, components);
+}
+
+/* The most that arrives of a channel is taken off a texel's power, and off irradiance if there is any;
+ * shadows are left as parts of that. */
+static void take_shadows(float *texels, float *irradiance, float *shadows,
+                         const struct render_light_view *view)
+{
+    for (int y = 0; y < view->size_px; y++) {
+        for (int x = 0; x < view->size_px; x++) {
+            const size_t i = (size_t)y * (size_t)view->size_px + (size_t)x;
+            const float *const shadow =
+                shadows + 4 * ((size_t)(y / view->shadow_block_px) * (size_t)view->shadow_side_px +
+                               (size_t)(x / view->shadow_block_px));
+            const float most = fmaxf(shadow[0], fmaxf(shadow[1], shadow[2]));
+            texels[4 * i + 3] *= most;
+            if (irradiance)
+                irradiance[i] *= most;
+        }
+    }
+    for (int i = 0; i < view->shadow_side_px * view->shadow_side_px; i++) {
+        float *const shadow = shadows + 4 * (size_t)i;
+        const float most = fmaxf(shadow[0], fmaxf(shadow[1], shadow[2]));
+        for (int k = 0; k < 3 && most > 0; k++)
+            shadow[k] /= most;
+    }
 }
 
 static struct render_light_target target_of(const struct render_frame *frame, size_t index,
@@ -193,15 +223,25 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
     const bool is_fixed = plan->coherence == RENDER_COHERENCE_SURFACE;
     float *const rest_mm = is_fixed ? read_view(frame, "light_rest", GL_RGBA, 4) : NULL;
+    const bool is_shadowed = plan->shadows.of_view != NULL;
+    const int block_px = render_plan_shadow_block_px(plan),
+              side_px = (view->size_px + block_px - 1) / block_px;
+    float *const shadows = is_shadowed ? read_part(frame, "light_shadow", side_px, GL_RGBA, 4) : NULL;
     bool done = targets && texels && (objects || !plan->has_object_ids) && (irradiance || !is_counted) &&
-                (rest_mm || !is_fixed);
+                (rest_mm || !is_fixed) && (shadows || !is_shadowed);
     if (done) {
         struct render_light_view reduced = { .texels = texels,
                                              .objects = objects,
                                              .irradiance = irradiance,
                                              .rest_mm = rest_mm,
+                                             .shadow_block_px = block_px,
+                                             .shadow_side_px = side_px,
                                              .size_px = view->size_px,
                                              .levels = view->levels };
+        if (shadows)
+            take_shadows(texels, irradiance, shadows, &reduced);
+        if (plan->shadows.coloured_count > 0)
+            reduced.shadows = shadows;
         memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
         memcpy(reduced.rgb, frame->request->scene->lights[view->light].rgb, sizeof reduced.rgb);
         for (size_t i = 0; i < object_count; i++) {
@@ -225,6 +265,7 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     free(objects);
     free(irradiance);
     free(rest_mm);
+    free(shadows);
     return done;
 }
 

@@ -48,6 +48,36 @@ static double difference(struct renderer *renderer, const struct io_image *found
     return relative_rmse(&deviation);
 }
 
+/* Oracle: light adds up. What two lights do beside an environment is what each does; shadows and gloss are
+ * those of the light that they are of. */
+static void lights_add_up_beside_it(void **state)
+{
+    (void)state;
+    const struct io_material material = marble();
+    struct io_image *images[4];
+    for (int i = 0; i < 4; i++) { /* none, one, the other, both */
+        struct test_scene test;
+        init(&test, IO_PRIMITIVE_KNOT, &material, "studio");
+        test.objects[0].has_specular = true;
+        if (i & 1)
+            scene_add_directional(&test, -1, -1, -1, 3);
+        if (i & 2)
+            scene_add_directional(&test, 1, -1, -1, 3);
+        struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
+        images[i] = draw(renderer, &(struct render_options){ .technique = RENDER_TECHNIQUE_LAMBERT }, NULL);
+        render_destroy(renderer);
+        scene_end(&test);
+    }
+    const int count = 4 * images[0]->width_px * images[0]->height_px;
+    for (int i = 0; i < count; i++) {
+        const double sum =
+            (double)images[1]->pixels[i] + (double)images[2]->pixels[i] - (double)images[0]->pixels[i];
+        assert_true(fabs(sum - (double)images[3]->pixels[i]) < 1e-5 * (1 + fabs(sum)));
+    }
+    for (int i = 0; i < 4; i++)
+        io_image_destroy(images[i]);
+}
+
 /* Oracle: the reference, which sums the map itself over random points. At the default epsilon splats are
  * within it, of each map on a ball and on a knot; peeling along three axes is nearly as good. */
 static void splats_agree_with_the_reference(void **state)
@@ -287,6 +317,7 @@ static void orders_follow_epsilon_and_the_map(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lights_add_up_beside_it),
         cmocka_unit_test(plans_take_what_is_asked),
         cmocka_unit_test(orders_follow_epsilon_and_the_map),
         cmocka_unit_test(lambert_shows_the_irradiance),

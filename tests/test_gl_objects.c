@@ -27,6 +27,11 @@ static const struct kept {
     { .effect = "overlap", .texture_count = 2, .buffer_count = 3 },    /* the same                      */
     /* samples, profiles and lists; tiles; levels of pixels */
     { .effect = "gather_gl", .texture_count = 4, .buffer_count = 4, .vertex_array_count = 1 },
+    { .effect = "avsm",
+      .texture_count = 2,
+      .buffer_count = 2,
+      .program_count = 1 },                                             /* ranges, nodes, the list */
+    { .effect = "soft_shadow", .texture_count = 1, .buffer_count = 1 }, /* taps */
     { .effect = "environment", .texture_count = 1, .buffer_count = 1 }, /* harmonics               */
     { .effect = "environment_peel", .texture_count = 1 },               /* the layer before         */
     { .effect = "tsm_table", .texture_count = 4, .buffer_count = 2, .is_per_medium = true },
@@ -184,7 +189,13 @@ static void check_request(const struct test_scene *test, struct render_request r
     if (!render_run(renderer, &request, &plan, time_ms, &status))
         fail_msg("%s", status.message);
     const size_t object_count = test->scene.object_count;
-    const struct counts found = count_objects(), expected = expected_counts(plan, object_count);
+    const struct counts found = count_objects();
+    struct counts expected = expected_counts(plan, object_count);
+    for (size_t i = 0; plan->shadows.of_view && i < test->scene.blocker_count;
+         i++) { /* particles have no triangles */
+        expected.buffers += test->scene.blockers[i].particle_mm > 0 ? 1 : 2;
+        expected.vertex_arrays++;
+    }
     /* what is so far away that no pixel shows it has neither lists nor levels to be gathered by */
     const size_t spared = plan->gather == RENDER_GATHER_GL ? 2 : 0;
     assert_in_range(found.textures, expected.textures - spared, expected.textures);
@@ -193,7 +204,7 @@ static void check_request(const struct test_scene *test, struct render_request r
     assert_int_equal(found.programs, render_executor_program_count(renderer->executor));
     assert_int_equal(found.vertex_arrays, expected.vertex_arrays);
     assert_int_equal(found.shaders, 0);
-    assert_int_equal(found.framebuffers, 0);
+    assert_int_equal(found.framebuffers, expected.framebuffers);
     for (size_t e = 0; render_effects[e]; e++) {
         seen[plan->decisions[e].is_active][e] = true;
         size_t least;
@@ -204,7 +215,10 @@ static void check_request(const struct test_scene *test, struct render_request r
         const char *const name = render_effects[e]->name;
         if (strcmp(name, "gather_gl") == 0)
             assert_true(draw_count == 0 || most > 0);
-        else if (strncmp(name, "tsm_", 4) == 0 || strcmp(name, "environment_peel") == 0)
+        else if (strcmp(name, "avsm") == 0) /* draws what is seen nowhere */
+            assert_int_equal(draw_count > 0, plan->decisions[e].is_active);
+        else if (strncmp(name, "tsm_", 4) == 0 || strcmp(name, "environment_peel") == 0 ||
+                 strcmp(name, "shadow_map") == 0)
             assert_int_equal(draw_count > 0, most > 0);
         else
             assert_true(draw_count >= least && draw_count <= most);
@@ -310,6 +324,29 @@ static void objects_and_draws_are_those_of_the_plan(void **state)
         check_request(&test, around[i], seen);
         scene_end(&test);
     }
+    struct test_scene by_opengl;
+    init_scene(&by_opengl, SCENE_LIT);
+    check_request(
+        &by_opengl,
+        (struct render_request){ .technique = RENDER_TECHNIQUE_GATHER, .gather = RENDER_GATHER_GL }, seen);
+    scene_end(&by_opengl);
+    struct test_scene shadowed;
+    init_scene(&shadowed, SCENE_GLOSSY);
+    struct io_blocker blockers[] = {
+        { .mesh = shadowed.objects[0].mesh, .opacity = { 0.1, 0.2, 0.3 } },
+        { .mesh = shadowed.objects[0].mesh, .opacity = { 1, 1, 1 } },
+        { .mesh = shadowed.objects[0].mesh, .opacity = { 1, 0, 1 }, .particle_mm = 1 }
+    };
+    shadowed.scene.blockers = blockers;
+    for (size_t i = 0; i < 3; i++) {
+        shadowed.scene.blocker_count = i + 1;
+        shadowed.lights[0].size_rad = i == 1 ? 0.1 : 0;
+        check_request(&shadowed,
+                      (struct render_request){ .technique = i == 2 ? RENDER_TECHNIQUE_LAMBERT
+                                                                   : RENDER_TECHNIQUE_SPLAT },
+                      seen);
+    }
+    scene_end(&shadowed);
     for (size_t e = 0; render_effects[e]; e++) {
         assert_true(seen[true][e]);
         assert_true(seen[false][e] || strcmp(render_effects[e]->name, "surface") == 0);

@@ -49,10 +49,13 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     struct test_scene test;
     init_sphere(&test);
     const struct io_material other = skin1();
-    enum { REQUESTS = 17, FIRST_AROUND = 11, MOVING = 15, BY_OPENGL = 16 };
+    enum { REQUESTS = 18, FIRST_AROUND = 11, MOVING = 15, BY_OPENGL = 16, SHADOWED = 17 };
     struct render_request requests[REQUESTS];
     for (int i = 0; i < REQUESTS; i++)
         requests[i] = request_for(&test);
+    /* a coloured pane stands before a light with a size */
+    struct io_blocker pane = { .mesh = test.objects[0].mesh, .opacity = { 0.1, 0.2, 0.3 } };
+    test.scene.blockers = &pane;
     requests[0].technique = RENDER_TECHNIQUE_SPLAT;
     requests[1].technique = RENDER_TECHNIQUE_LAMBERT;
     requests[2].is_captured = true;
@@ -75,10 +78,13 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     strcpy(test.scene.environment.path, SOURCE_FOLDER "/scenes/probes/studio.exr");
     for (int i = 0; i < REQUESTS; i++) {
         test.scene.has_environment = i >= FIRST_AROUND && i < MOVING;
-        test.objects[0].has_specular = i == 3;
+        test.objects[0].has_specular = i == 3 || i == SHADOWED;
+        test.scene.blocker_count = i == SHADOWED;
+        test.lights[0].size_rad = i == SHADOWED ? 0.1 : 0;
         if (i == 5)
             assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 2, 5, &other));
         test.scene.light_count = i == 4 ? 0 : 1;
+        test.objects[0].motion = NULL;
         if (i == MOVING) {
             test.scene.frames.count = 2;
             test.objects[0].motion = &motion;

@@ -140,8 +140,8 @@ static void cells_are_equal_and_compact(void **state)
 static bool is_lit(const struct render_tracer *tracer, const struct io_light *light,
                    const struct render_surface_point *point)
 {
-    double to_light[3], falloff;
-    return render_light_reaches(tracer, light, point, to_light, &falloff);
+    double to_light[3], falloff, left[3];
+    return render_light_reaches(tracer, light, point, to_light, &falloff, left);
 }
 
 static struct io_light random_light(struct rng *rng)

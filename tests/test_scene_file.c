@@ -638,13 +638,15 @@ static void wrong_values_are_refused(void **state)
         { { .lights = "{\"direction\": [0, 0, 1], \"irradiance\": 3}" },
           "3:12: lights[0].kind is missing, it is required here" },
         { { .lights = "{\"kind\": \"area\"}" },
-          "3:21: lights[0].kind is \"area\", expected \"directional\" or \"point\"" },
+          "3:21: lights[0].kind is \"area\", expected \"directional\" or \"point\" or "
+          "\"spot\"" },
         { { .lights = "{\"kind\": \"directional\", \"direction\": [0, 0, 0], \"irradiance\": 3}" },
           "3:49: lights[0].direction is [0, 0, 0], expected a direction" },
         { { .lights = "{\"kind\": \"directional\", \"direction\": [0, 0, 1], \"irradiance\": -3}" },
           "3:74: lights[0].irradiance is -3, expected 0 to 1e+12" },
         { { .lights = "{\"kind\": \"directional\", \"direction\": [0, 0, 1], \"intensity\": 3}" },
-          "3:60: unknown key \"intensity\" in lights[0], expected kind, direction, irradiance" },
+          "3:60: unknown key \"intensity\" in lights[0], expected kind, direction, "
+          "irradiance, size_deg" },
         { { .lights = "{\"kind\": \"point\", \"position\": [0, 0, 1], \"intensity\": [1, 2]}" },
           "3:66: lights[0].intensity has 2 elements, expected an array of 3 numbers" },
         { { .lights = LIGHT ", {\"kind\": \"point\", \"intensity\": 1}" },

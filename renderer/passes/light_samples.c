@@ -56,6 +56,7 @@ static const struct render_pass passes[] = {
     { .name = "light_samples",
       .draw = RENDER_DRAW_NOTHING,
       .is_per_view = true,
+      .is_of_samples = true,
       .reads_if_written = { "light_view" },
       .writes = { "light_samples" },
       .run = sample },

@@ -42,6 +42,7 @@ static const struct render_pass passes[] = {
     { .name = "light_view",
       .draw = RENDER_DRAW_SCENE,
       .is_per_view = true,
+      .is_of_samples = true,
       .writes = { "light_view" },
       .writes_if_wanted = { "light_object", "light_irradiance", "light_rest" },
       .depth_written = "light_depth",

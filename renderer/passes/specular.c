@@ -36,7 +36,7 @@ static const struct render_pass passes[] = {
       .is_added = true,
       .reads = { "surface_triangle", "mesh_triangles", "mesh_positions_mm", "mesh_normals",
                  "mesh_roughness", "position_mm", "normal", "surface_exit", "light_view" },
-      .reads_if_written = { "object_media" },
+      .reads_if_written = { "object_media", "shadow" },
       .writes = { "specular" },
       .depth_tested = "position_depth",
       .bind = bind },

@@ -8,6 +8,9 @@
 uniform sampler2D position_mm;
 uniform sampler2D normal;
 uniform sampler2D surface_exit;
+#ifdef HAS_SHADOW
+uniform sampler2D shadow;  // what blockers leave of the light, of the pixel's own surface
+#endif
 layout(location = 0) out vec4 radiance;
 
 // f cosine of GGX with the height-correlated Smith term; alpha: roughness.
@@ -46,8 +49,12 @@ void main()
     rest = rest < 16u ? rest : 15u;
     vec3 sum = vec3(0.0);
     while (true) {
-        sum += weight * mirrored(point, roughness) * light_irradiance(point.position_mm.xyz) *
-               light_visibility(point.position_mm.xyz, point.normal);
+#ifdef HAS_SHADOW
+        vec3 visible = texelFetch(shadow, pixel, 0).rgb;
+#else
+        float visible = light_visibility(point.position_mm.xyz, point.normal);
+#endif
+        sum += weight * mirrored(point, roughness) * light_irradiance(point.position_mm.xyz) * visible;
         if (rest == 0u)
             break;
         point = point_of_pixel(pixel, findLSB(rest));

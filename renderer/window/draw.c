@@ -89,6 +89,7 @@ static bool draw_side(struct window *window, struct window_side *side, dipole_st
                                             .epsilon = side->epsilon,
                                             .area = window->drawing.area,
                                             .tsm = window->drawing.tsm,
+                                            .shadows = window->drawing.shadows,
                                             .media = window->renderer->media,
                                             .tables = window->drawing.tables,
                                             .volumes = window->drawing.volumes,

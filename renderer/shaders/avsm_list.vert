@@ -1,0 +1,2 @@
+// Pass avsm.
+#include "common/blocker.glsl"

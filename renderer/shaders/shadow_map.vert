@@ -1,0 +1,2 @@
+// Pass shadow_map.
+#include "common/blocker.glsl"
