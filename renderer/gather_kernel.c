@@ -40,60 +40,68 @@ static float spread_along(const float d_mm[3], const float m[6])
     return x * (m[0] * x + 2 * (m[4] * z + m[5] * y)) + y * (m[1] * y + 2 * m[3] * z) + m[2] * z * z;
 }
 
-/* Its column, and the place in it. */
-static uint32_t find_piece(const struct render_gather_kernel *kernel, float distance2_mm2, float *t_out)
+/* Where a source is on its polynomials. */
+struct piece_at {
+    uint32_t column;
+    float t;             /* place within the piece                                                  */
+    float slope, trace;  /* of t, per mm^2 of the distance squared; of the spread                   */
+    float first, second; /* what the spread multiplies the first and half the second derivative by */
+};
+
+/* false: beyond the reach. */
+static bool find_piece(const struct render_gather_kernel *kernel, const float step_mm[3],
+                       const float spread_mm2[6], struct piece_at *at)
 {
+    const float distance2_mm2 = step_mm[0] * step_mm[0] + step_mm[1] * step_mm[1] + step_mm[2] * step_mm[2];
+    if (!(distance2_mm2 <= kernel->reach2_mm2))
+        return false;
     const float u = 1 + distance2_mm2 * kernel->inverse_per_mm2;
     uint32_t bits;
     memcpy(&bits, &u, sizeof bits);
-    const uint32_t piece = bits >> 22 & (RENDER_GATHER_PIECES - 1);
+    at->column = bits >> 22 & (RENDER_GATHER_PIECES - 1);
     bits = (bits & 0x3fffffu) | 0x3f800000u;
-    memcpy(t_out, &bits, sizeof *t_out);
-    *t_out -= 1.25f;
-    return piece;
+    memcpy(&at->t, &bits, sizeof at->t);
+    at->t -= 1.25f;
+    at->slope = kernel->slope[at->column];
+    at->trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2];
+    at->first = at->slope * at->trace;
+    at->second = 4 * at->slope * at->slope * spread_along(step_mm, spread_mm2);
+    return true;
 }
 
 void render_gather_kernel_at(const struct render_gather_kernel *kernel, const float step_mm[3],
                              const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT])
 {
-    const float distance2_mm2 = step_mm[0] * step_mm[0] + step_mm[1] * step_mm[1] + step_mm[2] * step_mm[2];
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        rgb_out[c] = 0;
-    if (!(distance2_mm2 <= kernel->reach2_mm2))
-        return;
-    float t;
-    const uint32_t piece = find_piece(kernel, distance2_mm2, &t);
-    const float slope = kernel->slope[piece];
-    const float trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2];
-    const float first = slope * trace, second = 4 * slope * slope * spread_along(step_mm, spread_mm2);
+    struct piece_at at;
+    const bool is_near = find_piece(kernel, step_mm, spread_mm2, &at);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        rgb_out[c] = 0;
+        if (!is_near)
+            continue;
         const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
-        const float t0 = terms[0][piece], t1 = terms[1][piece], t2 = terms[2][piece], t3 = terms[3][piece];
+        const float t0 = terms[0][at.column], t1 = terms[1][at.column], t2 = terms[2][at.column],
+                    t3 = terms[3][at.column], t = at.t;
         const float half_bend = t2 + 3 * t * t3; /* of the cubic */
-        rgb_out[c] =
-            t0 + t * (t1 + t * (t2 + t * t3)) + first * (t1 + t * (half_bend + t2)) + second * half_bend;
-        rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * trace;
+        rgb_out[c] = t0 + t * (t1 + t * (t2 + t * t3)) + at.first * (t1 + t * (half_bend + t2)) +
+                     at.second * half_bend;
+        rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * at.trace;
     }
 }
 
 void render_gather_kernel_change_at(const struct render_gather_kernel *kernel, const float step_mm[3],
                                     const float spread_mm2[6], float rgb_out[IO_CHANNEL_COUNT])
 {
-    const float distance2_mm2 = step_mm[0] * step_mm[0] + step_mm[1] * step_mm[1] + step_mm[2] * step_mm[2];
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        rgb_out[c] = 0;
-    if (!(distance2_mm2 <= kernel->reach2_mm2))
-        return;
-    float t;
-    const uint32_t piece = find_piece(kernel, distance2_mm2, &t);
-    const float slope = kernel->slope[piece], trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2];
-    const float first = slope * trace, second = 4 * slope * slope * spread_along(step_mm, spread_mm2);
+    struct piece_at at;
+    const bool is_near = find_piece(kernel, step_mm, spread_mm2, &at);
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        rgb_out[c] = 0;
+        if (!is_near)
+            continue;
         const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
-        const float t1 = terms[1][piece], t2 = terms[2][piece], t3 = terms[3][piece];
+        const float t1 = terms[1][at.column], t2 = terms[2][at.column], t3 = terms[3][at.column], t = at.t;
         const float half_bend = t2 + 3 * t * t3;
-        rgb_out[c] = slope * (t1 + t * (half_bend + t2) + 4 * first * half_bend + 3 * second * t3);
-        rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * trace;
+        rgb_out[c] = at.slope * (t1 + t * (half_bend + t2) + 4 * at.first * half_bend + 3 * at.second * t3);
+        rgb_out[c] *= 1 + kernel->lost_per_mm2[c] * at.trace;
     }
 }
 

@@ -2,8 +2,8 @@
  * reference, and what the plan decides. */
 #include "drawing.h"
 #include "environment_maps.h"
+#include "plans.h"
 
-#include "renderer/plan.h"
 #include "renderer/reference.h"
 
 static void light_by(struct test_scene *test, const char *map)
@@ -190,25 +190,6 @@ static void visibility_agrees_with_the_reference(void **state)
 }
 
 /* ---- plans -------------------------------------------------------------------------------------- */
-
-static const struct render_decision *decision_of(const struct render_plan *plan, const char *name)
-{
-    for (size_t e = 0; render_effects[e]; e++) {
-        if (strcmp(render_effects[e]->name, name) == 0)
-            return &plan->decisions[e];
-    }
-    fail_msg("no effect %s", name);
-    return NULL;
-}
-
-static struct render_plan *plan_for(const struct render_request *request)
-{
-    struct render_plan *plan;
-    dipole_status status;
-    if (!render_plan_create(request, &plan, &status))
-        fail_msg("%s", status.message);
-    return plan;
-}
 
 static bool has_note(const struct render_plan *plan, const char *text)
 {

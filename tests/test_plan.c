@@ -1,23 +1,13 @@
 /* renderer/plan.c, projection.c, splats.c: everything that is decided before OpenGL is called. */
-#include "check.h"
+#include "plans.h"
 #include "scenes.h"
 
 #include "io/scene_motion.h"
-#include "renderer/plan.h"
 #include "renderer/splats.h"
 
 static struct render_request request_for(const struct test_scene *test)
 {
     return (struct render_request){ .scene = &test->scene, .epsilon = 0.01 };
-}
-
-static struct render_plan *plan_for(const struct render_request *request)
-{
-    struct render_plan *plan;
-    dipole_status status;
-    if (!render_plan_create(request, &plan, &status))
-        fail_msg("%s", status.message);
-    return plan;
 }
 
 /* A marble sphere of radius 8 mm under one directional light. */
@@ -529,16 +519,6 @@ static void splats_hold_what_their_samples_reach(void **state)
 }
 
 /* ---- bad requests ------------------------------------------------------------------------------- */
-
-static void fails_with(const struct render_request *request, const char *message)
-{
-    struct render_plan *plan;
-    dipole_status status = { 0 };
-    assert_false(render_plan_create(request, &plan, &status));
-    assert_null(plan);
-    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
-    assert_string_equal(status.message, message);
-}
 
 /* Oracle: the messages. */
 static void options_of_maps_that_contradict_are_told(void **state)

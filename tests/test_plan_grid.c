@@ -1,28 +1,9 @@
 /* renderer/plan_grid.c: splats over a uniform grid of each light's view. */
-#include "check.h"
 #include "drawing.h"
+#include "plans.h"
 
-#include "renderer/plan.h"
 #include "renderer/renderer.h"
 #include "renderer/splat_draw.h"
-
-static struct render_plan *plan_for(const struct render_request *request)
-{
-    struct render_plan *plan = NULL;
-    dipole_status status;
-    if (!render_plan_create(request, &plan, &status))
-        fail_msg("%s", status.message);
-    return plan;
-}
-
-static const struct render_decision *decision_of(const struct render_plan *plan, const char *name)
-{
-    size_t e = 0;
-    while (render_effects[e] && strcmp(render_effects[e]->name, name) != 0)
-        e++;
-    assert_non_null(render_effects[e]);
-    return &plan->decisions[e];
-}
 
 /* ---- the bound ---------------------------------------------------------------------------------- */
 
@@ -188,16 +169,6 @@ static void a_grid_is_of_splats_alone(void **state)
     assert_false(plan->has_grid);
     render_plan_destroy(plan);
     scene_end(&test);
-}
-
-static void fails_with(const struct render_request *request, const char *message)
-{
-    struct render_plan *plan;
-    dipole_status status = { 0 };
-    assert_false(render_plan_create(request, &plan, &status));
-    assert_null(plan);
-    assert_int_equal(status.code, DIPOLE_BAD_VALUE);
-    assert_string_equal(status.message, message);
 }
 
 /* Oracle: the messages. Six views of a light within the scene have a sixth of the texels each; auto keeps
