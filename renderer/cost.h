@@ -33,7 +33,7 @@
 #define RENDER_COST_GATHER_PIXEL 60.0     /* interpolated                                 */
 #define RENDER_COST_GATHER_SAMPLE 70.0    /* ordered and merged                           */
 #define RENDER_COST_GATHER_PLACE 100.0    /* read back, its tile's lists made     */
-#define RENDER_COST_GATHER_GL 7.0         /* one merged sample at one place, by llvmpipe        */
+#define RENDER_COST_GATHER_GL 9.0         /* one merged sample at one place, by llvmpipe        */
 #define RENDER_COST_MAP_TEXEL 37.0        /* of a translucent shadow map: drawn, levels made  */
 #define RENDER_COST_MAP_SAMPLE 66.0       /* one sample of a map at one point             */
 #define RENDER_COST_MAP_LAYER 25.0        /* each layer that it looks into                */
