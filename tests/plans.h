@@ -20,12 +20,12 @@ static inline struct render_plan *plan_for(const struct render_request *request)
 /* What was decided about an effect. */
 static inline const struct render_decision *decision_of(const struct render_plan *plan, const char *name)
 {
-    for (size_t e = 0; render_effects[e]; e++) {
-        if (strcmp(render_effects[e]->name, name) == 0)
-            return &plan->decisions[e];
-    }
-    fail_msg("no effect %s", name);
-    return NULL;
+    size_t e = 0;
+    while (render_effects[e] && strcmp(render_effects[e]->name, name) != 0)
+        e++;
+    if (!render_effects[e])
+        fail_msg("no effect %s", name);
+    return &plan->decisions[e];
 }
 
 /* No plan is made, and this is why. */

@@ -1,23 +1,11 @@
 /* renderer/plan_shadows.c and the effects of shadows: what each scene calls for. */
 #include "blockers.h"
-#include "check.h"
+#include "plans.h"
 #include "scenes.h"
-
-#include "renderer/plan.h"
 
 enum { EFFECTS = 7 };
 static const char *const names[EFFECTS] = { "shadow_map", "avsm",           "avsm_colour", "soft_shadow",
                                             "shadow",     "shadow_nearest", "light_shadow" };
-
-static const struct render_decision *decision_of(const struct render_plan *plan, const char *name)
-{
-    for (size_t e = 0; render_effects[e]; e++) {
-        if (strcmp(render_effects[e]->name, name) == 0)
-            return &plan->decisions[e];
-    }
-    fail_msg("no effect %s", name);
-    return NULL;
-}
 
 /* Oracle: docs/shadows.md. */
 static void each_effect_is_called_for_by_what_it_is_for(void **state)
