@@ -1,6 +1,6 @@
 /* Objects that only stand in the way of light. */
 #include "io/scatter.h"
-#include "io/scene_internal.h"
+#include "io/scene_motion.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -134,11 +134,11 @@ static double mean_scale(const struct io_scene_transform *transform)
 }
 
 bool io_scene_read_blocker(const struct io_json *at, const struct io_scene_options *options, double unit_mm,
-                           struct io_blocker *blocker, dipole_status *status)
+                           int frame_count, struct io_blocker *blocker, dipole_status *status)
 {
     static const char *const known[] = {
         "opacity", "extinction_per_mm", "extinction_of", "mesh", "primitive", "detail", "particles",
-        "fibres",  "transform",         "sheet",         "name", NULL
+        "fibres",  "transform",         "sheet",         "name", "deform",    "motion", NULL
     };
     const struct io_json transform_at = io_json_member(at, "transform");
     struct io_scene_transform transform;
@@ -152,5 +152,11 @@ bool io_scene_read_blocker(const struct io_json *at, const struct io_scene_optio
         !io_scene_fit_mesh(at, blocker->mesh, &transform, status))
         return false;
     blocker->particle_mm *= mean_scale(&transform) * unit_mm;
-    return io_scene_place_mesh(at, &transform, unit_mm, blocker->mesh, status);
+    const struct io_motion_reading reading = { .at = at,
+                                               .options = options,
+                                               .transform = &transform,
+                                               .unit_mm = unit_mm,
+                                               .frame_count = frame_count };
+    return io_scene_place_mesh(at, &transform, unit_mm, blocker->mesh, status) &&
+           io_scene_read_motion(&reading, &blocker->mesh, &blocker->motion, status);
 }

@@ -215,7 +215,7 @@ static bool read_shapes(const struct io_json *at, const struct io_scene_options 
                                                .transform = &transform,
                                                .unit_mm = unit_mm,
                                                .frame_count = scene->frames.count };
-    return io_scene_read_motion(&reading, object, status);
+    return io_scene_read_motion(&reading, &object->mesh, &object->motion, status);
 }
 
 static bool read_bundled_material(const struct io_json *at, struct io_material *material,
@@ -248,9 +248,11 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
                         const struct io_scene *scene, double unit_mm, struct io_object *object,
                         dipole_status *status)
 {
-    static const char *const known[] = { "material",      "mesh",      "primitive", "detail",
-                                         "name",          "transform", "roughness", "specular",
-                                         "mesh_sequence", "deform",    "motion",    NULL };
+    static const char *const known[] = { "material",  "mesh",      "primitive", "detail",        "name",
+                                         "transform", "roughness", "specular",  "mesh_sequence", "deform",
+                                         "motion",    "casts",     NULL };
+    static const char *const casts_names[] = { "auto", "opaque", "translucent", NULL };
+    int casts = IO_CASTS_AUTO;
     const struct io_json material = io_json_member(at, "material");
     *object = (struct io_object){ .roughness = IO_SCENE_ROUGHNESS, .has_specular = true };
     if (!io_json_check_object(at, known, 1, status))
@@ -260,6 +262,9 @@ static bool read_object(const struct io_json *at, const struct io_scene_options 
                  *primitive = json_object_get(at->value, "primitive");
     const char *shape = json_string_value(mesh ? mesh : primitive);
     snprintf(object->name, sizeof object->name, "%s", shape ? shape : "");
+    if (!io_json_get_choice(at, "casts", casts_names, &casts, status))
+        return false;
+    object->casts = (enum io_casts)casts;
     return io_json_get_text(at, "name", object->name, sizeof object->name, status) &&
            io_json_get_number(at, "roughness", 0.05, 1, &object->roughness, status) &&
            io_json_get_bool(at, "specular", &object->has_specular, status) &&
@@ -331,9 +336,9 @@ static bool read_element(const struct io_json *at, const struct io_scene_options
 {
     if (io_scene_is_blocker(at)) {
         struct io_blocker *const blocker = &scene->blockers[scene->blocker_count++];
-        if (!io_scene_read_blocker(at, options, unit_mm, blocker, status))
+        if (!io_scene_read_blocker(at, options, unit_mm, scene->frames.count, blocker, status))
             return false;
-        *triangle_count += blocker->mesh->triangle_count;
+        *triangle_count += (blocker->motion ? blocker->motion->meshes[0] : blocker->mesh)->triangle_count;
         return true;
     }
     struct io_object *const object = &scene->objects[scene->object_count++];
@@ -424,9 +429,9 @@ void io_scene_destroy(struct io_scene *scene)
     if (!scene)
         return;
     for (size_t i = 0; i < scene->object_count; i++)
-        io_scene_end_object(&scene->objects[i]);
+        io_scene_end_shape(scene->objects[i].mesh, scene->objects[i].motion);
     for (size_t i = 0; i < scene->blocker_count; i++)
-        io_mesh_destroy(scene->blockers[i].mesh);
+        io_scene_end_shape(scene->blockers[i].mesh, scene->blockers[i].motion);
     free(scene->objects);
     free(scene->blockers);
     free(scene->lights);

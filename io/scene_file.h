@@ -49,12 +49,16 @@ struct io_frames {
 
 struct io_motion; /* as read: scene_motion.h */
 
+/* What an object throws on others: AUTO leaves it to who draws. */
+enum io_casts { IO_CASTS_AUTO = 0, IO_CASTS_OPAQUE, IO_CASTS_TRANSLUCENT };
+
 struct io_object {
     char name[128];
     struct io_mesh *mesh; /* positions in mm, in the world: transform and unit applied */
     struct io_material material;
     double roughness;  /* GGX roughness of the surface, 0.05 to 1; specular only     */
     bool has_specular; /* false when the object says "specular": false               */
+    enum io_casts casts;
 
     /* Of an object in motion: mesh is rest in the pose of the frame that is set. NULL and no effect for one
      * that stands still, whose mesh never changes. */
@@ -79,6 +83,15 @@ struct io_motion_kinds io_object_motion_kinds(const struct io_object *object);
  * most (of some that are looked at); 1 or more. The same in all frames. */
 double io_object_stretch(const struct io_object *object);
 
+/* What a body leaves of light by the length of the way through it, tabulated; no file has it:
+ * renderer/passage.h fills it, and says what it is between nodes. */
+enum { IO_PASSAGE_NODES = 64 };
+struct io_passage {
+    double first_mm;
+    int counts[IO_CHANNEL_COUNT];
+    double depth[IO_CHANNEL_COUNT][IO_PASSAGE_NODES]; /* optical: -ln of what is left */
+};
+
 /*
  * What stands in the way of light, and is not seen itself. A solid keeps its opacity of the light on each
  * way through it, or by extinction the more the longer the way; a sheet at each of its surfaces. Particles
@@ -90,8 +103,12 @@ struct io_blocker {
     double particle_mm;   /* radius; 0: these are no particles                                            */
     bool is_sheet;
     bool has_extinction;
-    double opacity[3];           /* per channel, 0 to 1   */
-    double extinction_per_mm[3]; /* >= 0, if it has one   */
+    double opacity[3];                /* per channel, 0 to 1   */
+    double extinction_per_mm[3];      /* >= 0, if it has one   */
+    const struct io_passage *passage; /* in place of both; NULL: of all that a file has */
+
+    /* Of one that is deformed or moves: mesh is in the pose of the frame that is set. Else NULL. */
+    struct io_motion *motion;
 };
 
 struct io_scene {

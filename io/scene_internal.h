@@ -68,11 +68,11 @@ DIPOLE_CHECKED bool io_scene_place_mesh(const struct io_json *at,
 DIPOLE_CHECKED bool io_scene_read_shape(const struct io_json *at, const struct io_scene_options *options,
                                         struct io_mesh **mesh, dipole_status *status);
 
-/* Whether an element of objects is a blocker; then read it. Its mesh is set when reading failed after it,
- * too. */
+/* Whether an element of objects is a blocker; then read it. Its mesh and motion are set when reading failed
+ * after them, too; of one that moves the mesh is there once it is posed. */
 bool io_scene_is_blocker(const struct io_json *at);
 DIPOLE_CHECKED bool io_scene_read_blocker(const struct io_json *at, const struct io_scene_options *options,
-                                          double unit_mm, struct io_blocker *blocker,
+                                          double unit_mm, int frame_count, struct io_blocker *blocker,
                                           dipole_status *status);
 
 /* Read the mesh file that a string names. */

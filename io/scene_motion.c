@@ -314,20 +314,19 @@ static bool create_posed(const struct io_motion_reading *reading, struct io_moti
            io_json_fail(reading->at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
 }
 
-/* The one mesh of an object, or its sequence. */
-static bool take_meshes(const struct io_motion_reading *reading, struct io_object *object,
-                        dipole_status *status)
+/* The one mesh, or a sequence. */
+static bool take_meshes(const struct io_motion_reading *reading, struct io_mesh **mesh,
+                        struct io_motion *motion, dipole_status *status)
 {
-    struct io_motion *const motion = object->motion;
     const struct io_json sequence = io_json_member(reading->at, "mesh_sequence");
     if (sequence.value)
         return io_scene_read_sequence(reading, motion, status);
     motion->meshes = calloc(1, sizeof(void *));
     if (!motion->meshes)
         return io_json_fail(reading->at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
-    motion->meshes[0] = object->mesh;
+    motion->meshes[0] = *mesh;
     motion->mesh_count = 1;
-    object->mesh = NULL;
+    *mesh = NULL;
     return true;
 }
 
@@ -378,8 +377,8 @@ double io_object_stretch(const struct io_object *object)
     return object->motion ? object->motion->stretch : 1;
 }
 
-bool io_scene_read_motion(const struct io_motion_reading *reading, struct io_object *object,
-                          dipole_status *status)
+bool io_scene_read_motion(const struct io_motion_reading *reading, struct io_mesh **mesh,
+                          struct io_motion **motion_out, dipole_status *status)
 {
     const json_t *const json = reading->at->value;
     if (!json_object_get(json, "mesh_sequence") && !json_object_get(json, "deform") &&
@@ -389,22 +388,21 @@ bool io_scene_read_motion(const struct io_motion_reading *reading, struct io_obj
     if (!motion)
         return io_json_fail(reading->at, DIPOLE_OUT_OF_MEMORY, status, "does not fit into memory");
     motion->frame_count = reading->frame_count;
-    object->motion = motion;
-    return take_meshes(reading, object, status) &&
+    *motion_out = motion;
+    return take_meshes(reading, mesh, motion, status) &&
            read_deforms(reading, motion->meshes[0], motion, status) &&
            read_move(reading, motion->meshes[0], motion, status) && create_posed(reading, motion, status) &&
            measure_stretch(motion);
 }
 
-void io_scene_end_object(struct io_object *object)
+void io_scene_end_shape(struct io_mesh *mesh, struct io_motion *motion)
 {
-    struct io_motion *const motion = object->motion;
     if (!motion) {
-        io_mesh_destroy(object->mesh);
+        io_mesh_destroy(mesh);
         return;
     }
     if (motion->mesh_count == 0) /* not taken yet */
-        io_mesh_destroy(object->mesh);
+        io_mesh_destroy(mesh);
     for (size_t i = 0; i < motion->mesh_count; i++)
         io_mesh_destroy(motion->meshes[i]);
     io_mesh_destroy(motion->posed);
@@ -566,6 +564,15 @@ static void pose_object(struct io_object *object, int frame)
     object->mesh = motion->posed ? motion->posed : rest;
 }
 
+/* Without a sequence: io_scene_read_blocker knows none. */
+static void pose_blocker(struct io_blocker *blocker, int frame)
+{
+    struct io_motion *const motion = blocker->motion;
+    const struct io_pose pose = pose_at(motion, frame);
+    pose_mesh(&pose, motion->meshes[0], motion);
+    blocker->mesh = motion->posed;
+}
+
 static void grow_box(struct io_scene *scene, const struct io_mesh *mesh)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -584,5 +591,9 @@ void io_scene_pose_objects(struct io_scene *scene, int frame)
         if (scene->objects[i].motion)
             pose_object(&scene->objects[i], frame);
         grow_box(scene, scene->objects[i].mesh);
+    }
+    for (size_t i = 0; i < scene->blocker_count; i++) {
+        if (scene->blockers[i].motion)
+            pose_blocker(&scene->blockers[i], frame);
     }
 }

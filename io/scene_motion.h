@@ -43,10 +43,10 @@ struct io_motion_reading {
     int frame_count;
 };
 
-/* Read mesh_sequence, deform and motion of an object whose mesh is there, unless it is a sequence. Leaves
- * motion NULL when the object has none of them. */
-DIPOLE_CHECKED bool io_scene_read_motion(const struct io_motion_reading *reading, struct io_object *object,
-                                         dipole_status *status);
+/* Read mesh_sequence, deform and motion of an object whose mesh is there, unless it is a sequence; the mesh
+ * becomes the motion's. Leaves both as they are when the object has none of them. */
+DIPOLE_CHECKED bool io_scene_read_motion(const struct io_motion_reading *reading, struct io_mesh **mesh,
+                                         struct io_motion **motion_out, dipole_status *status);
 
 /* scene_sequence.c: read and place every mesh of a sequence. */
 DIPOLE_CHECKED bool io_scene_read_sequence(const struct io_motion_reading *reading,
@@ -55,9 +55,10 @@ DIPOLE_CHECKED bool io_scene_read_sequence(const struct io_motion_reading *readi
 /* Of all the object's meshes. */
 size_t io_scene_triangle_count(const struct io_object *object);
 
-/* Put every object into a frame's pose, and the box about the scene. */
+/* Put every object and blocker into a frame's pose, and the box about the scene. */
 void io_scene_pose_objects(struct io_scene *scene, int frame);
 
-void io_scene_end_object(struct io_object *object);
+/* Of an object or blocker, also of one that was read in part. */
+void io_scene_end_shape(struct io_mesh *mesh, struct io_motion *motion);
 
 #endif

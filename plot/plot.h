@@ -34,6 +34,7 @@ struct plot_series {
     bool is_thin;                 /* a line of half the width */
     enum plot_mark mark;          /* of points */
     bool is_hollow;               /* points that let the lines below be seen */
+    const char *const *tips;      /* of each point, shown while the mouse is over it; NULL for none */
 };
 
 /* A straight line across the frame, its label outside. */

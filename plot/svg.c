@@ -130,13 +130,15 @@ static void band_draw(struct plot_text *out, const struct plot_layout *layout,
 }
 
 static void point_draw(struct plot_text *out, double x_px, double y_px, const struct plot_series *series,
-                       const char *color)
+                       const char *color, const char *tip)
 {
     static const char *const outlines[] = { [PLOT_SQUARE] = "m-3.6 -3.6h7.2v7.2h-7.2z",
                                             [PLOT_DIAMOND] = "m0 -5l5 5l-5 5l-5 -5z",
                                             [PLOT_TRIANGLE] = "m0 -5l4.8 8.4h-9.6z" };
     const char *const fill = series->is_hollow ? "none" : color;
     const char *const stroke = series->is_hollow ? color : "white";
+    if (tip)
+        plot_text_print(out, "<g><title>%s</title>\n", tip);
     if (series->mark == PLOT_DISC)
         plot_text_print(out,
                         "<circle cx=\"%f\" cy=\"%f\" r=\"4\" fill=\"%s\" stroke=\"%s\" "
@@ -145,6 +147,8 @@ static void point_draw(struct plot_text *out, double x_px, double y_px, const st
     else
         plot_text_print(out, "<path fill=\"%s\" stroke=\"%s\" stroke-width=\"1.2\" d=\"M%f %f%s\"/>\n",
                         fill, stroke, x_px, y_px, outlines[series->mark]);
+    if (tip)
+        plot_text_print(out, "</g>\n");
 }
 
 /* From one end of an interval to the other. A hollow point's bar is left out where it would lie within. */
@@ -177,7 +181,7 @@ static void points_draw(struct plot_text *out, const struct plot_layout *layout,
             continue;
         if (series->y_low && series->y_high)
             bar_draw(out, layout, series, i, color);
-        point_draw(out, x_px, y_px, series, color);
+        point_draw(out, x_px, y_px, series, color, series->tips ? series->tips[i] : NULL);
     }
 }
 
@@ -237,7 +241,7 @@ static void swatch_draw(struct plot_text *out, const struct plot_series *series,
                         x_px, y_px - 5, PLOT_SWATCH_PX, PLOT_SWATCH_PX);
         break;
     case PLOT_POINTS:
-        point_draw(out, x_px + PLOT_SWATCH_PX / 2.0, y_px, series, color);
+        point_draw(out, x_px + PLOT_SWATCH_PX / 2.0, y_px, series, color, NULL);
         break;
     case PLOT_LINE:
         plot_text_print(out,

@@ -111,6 +111,9 @@ void plot_text_print(struct plot_text *text, const char *format, ...)
         case 'f':
             add_number(text, va_arg(arguments, double));
             break;
+        case '%':
+            plot_text_add(text, "%", 1);
+            break;
         default:
             assert(format[1] == 's');
             add_escaped(text, va_arg(arguments, const char *));

@@ -13,7 +13,7 @@ struct plot_text {
 void plot_text_add(struct plot_text *text, const void *bytes, size_t size);
 
 /*
- * Add a format that knows %d (int), %f (double, two decimals at most) and %s (UTF-8 text, escaped for
+ * Add a format that knows %d (int), %f (double, two decimals at most), %% and %s (UTF-8 text, escaped for
  * XML; bytes that XML cannot hold become U+FFFD). Independent of the locale.
  */
 void plot_text_print(struct plot_text *text, const char *format, ...) DIPOLE_PRINTF(2, 3);

@@ -1,7 +1,6 @@
 /*
  * What work costs, for the plan's predictions: measured with llvmpipe on two cores of an AMD EPYC, quiet.
- * Another machine is faster or slower in all alike, more or less; predictions are to within a factor of
- * two.
+ * Another machine is faster or slower, not in all alike: a calibration says how (calibration.h).
  */
 #ifndef RENDERER_COST_H
 #define RENDERER_COST_H
@@ -10,12 +9,15 @@
 
 #include <math.h>
 
-/* A program that is compiled or found in a cache, and first run; what makes the levels of maps, the same.
- */
+/* Of the first picture alone: a program that is compiled or found in a cache, and first run; what makes the
+ * levels of maps, the same. */
 #define RENDER_COST_PROGRAM_MS 5.0
 #define RENDER_COST_LEVELS_MS 60.0
 
+#define RENDER_COST_BESIDE_MS 20.0 /* beside effects: tables baked, functions of OpenGL loaded */
+
 /* Nanoseconds each. */
+#define RENDER_COST_BESIDE_PIXEL 30.0  /* read back and put into the picture           */
 #define RENDER_COST_TRIANGLE 90.0      /* drawn once, whatever it covers               */
 #define RENDER_COST_TRIANGLE_4 170.0   /* the same, where pixels have four points      */
 #define RENDER_COST_EMPTY_PIXEL 12.0   /* cleared and looked at                        */
@@ -30,6 +32,7 @@
 #define RENDER_COST_SPLAT_EVALUATION 2.8  /* one sample at one pixel                      */
 #define RENDER_COST_SPLAT_FRAGMENT 12.0   /* one pixel of a splat of one sample    */
 #define RENDER_COST_GATHER_EVALUATION 0.7 /* one sample at one place, if slopes spared none */
+#define RENDER_COST_GREY_SHARE 0.6        /* of an evaluation, where channels are alike */
 #define RENDER_COST_GATHER_PIXEL 60.0     /* interpolated                                 */
 #define RENDER_COST_GATHER_SAMPLE 70.0    /* ordered and merged                           */
 #define RENDER_COST_GATHER_PLACE 100.0    /* read back, its tile's lists made     */
@@ -41,15 +44,28 @@
 #define RENDER_COST_MAP_EVALUATION 20.0   /* one texel of a map at one pixel              */
 #define RENDER_COST_DEFORMED_VERTEX 50.0  /* posed once for all passes                    */
 #define RENDER_COST_MOVED_VERTEX 40.0
-#define RENDER_COST_SKY_SAMPLE 400.0      /* of the environment: its patches cut and put together */
-#define RENDER_COST_HARMONIC 4.0          /* each harmonic of each patch's irradiance */
-#define RENDER_COST_HARMONIC_PIXEL 5.0    /* the same by a shader, both of an order m */
-#define RENDER_COST_RAY 400.0             /* through the scene's triangles            */
-#define RENDER_COST_TREE_TRIANGLE 500.0   /* of the tree that they are traced through */
-#define RENDER_COST_BLOCKER_SURFACE 120.0 /* in one texel: listed, sorted, its curve made */
-#define RENDER_COST_SHADOW_TAP 20.0       /* of the search or of the filter */
-#define RENDER_COST_SCREEN_PIXEL 6.0      /* touched by a simple pass                     */
-#define RENDER_COST_POINTS_PIXEL 180.0    /* whose four points are looked at */
+#define RENDER_COST_SKY_SAMPLE 2600.0      /* of the environment: its patches cut and put together */
+#define RENDER_COST_SKY_TRIANGLE 95.0      /* that is cut, at the least                  */
+#define RENDER_COST_SKY_PATCH 140.0        /* one texel of a peeled layer put into a sample */
+#define RENDER_COST_PEEL_TRIANGLE 60.0     /* drawn into a layer                         */
+#define RENDER_COST_PEEL_TEXEL 125.0       /* of a layer, drawn, read back and looked at */
+#define RENDER_COST_SKY_NODE 10.0          /* of a table of irradiance, put in its place */
+#define RENDER_COST_SKY_TERM 0.9           /* of the orders m that each of them sums     */
+#define RENDER_COST_SKY_PIXEL 35.0         /* irradiance looked up by a shader           */
+#define RENDER_COST_RAY 125.0              /* through the scene's triangles              */
+#define RENDER_COST_TREE_TRIANGLE 330.0    /* of the tree that they are traced through */
+#define RENDER_COST_BLOCKER_TRIANGLE 155.0 /* drawn into a map or a list               */
+#define RENDER_COST_BLOCKER_SURFACE 120.0  /* in one texel: listed, sorted, its curve made */
+#define RENDER_COST_CURVE_TEXEL 10.0       /* of a map of curves, taken to OpenGL          */
+#define RENDER_COST_SHADOW_TEXEL 4.0       /* of a map, cleared and drawn; looked at       */
+#define RENDER_COST_SHADOW_POINT 60.0      /* whose shadow is asked for                    */
+#define RENDER_COST_CURVE_POINT 120.0      /* the same, more where there are curves        */
+#define RENDER_COST_SHADOW_BLOCK 120.0     /* of a light's view: its point and normal      */
+#define RENDER_COST_SHADOW_TAP 20.0        /* of the search or of the filter               */
+#define RENDER_COST_CURVE_TAP 60.0         /* the same through curves                      */
+#define RENDER_COST_HARD_TEXEL 5.0         /* one of those that a hard shadow is filtered over */
+#define RENDER_COST_SCREEN_PIXEL 6.0       /* touched by a simple pass                     */
+#define RENDER_COST_POINTS_PIXEL 180.0     /* whose four points are looked at */
 
 /* What a shader takes with a GPU, of what llvmpipe takes: assumed, none was at hand. */
 #define RENDER_COST_GPU_SHARE 0.02
@@ -71,6 +87,18 @@ static inline double render_cost_view_texels(const struct render_plan *plan)
     for (size_t i = 0; i < plan->view_count; i++)
         count += (double)plan->views[i].size_px * plan->views[i].size_px;
     return count;
+}
+
+/* Shadow factors at so many points of each view, of those that something may hide. */
+static inline double render_cost_shadow_points_ms(const struct render_plan *plan, size_t view,
+                                                  double point_count)
+{
+    const struct render_plan_shadow *const shadow = &plan->shadows.of_view[view];
+    const double tap = plan->shadows.translucent_count > 0 ? RENDER_COST_CURVE_TAP : RENDER_COST_SHADOW_TAP;
+    const double taps = shadow->light_size > 0 ? tap * shadow->share * 2 * plan->shadows.tap_count
+                                               : RENDER_COST_HARD_TEXEL * 16;
+    const double curves = plan->shadows.translucent_count > 0 ? RENDER_COST_CURVE_POINT : 0;
+    return render_cost_ms(RENDER_COST_SHADOW_POINT + curves + taps, point_count);
 }
 
 /* Texels of all translucent shadow maps; the time of the pattern's samples at some points; and pixels that
@@ -130,16 +158,23 @@ static inline double render_cost_splats_ms(const struct render_plan *plan)
                : render_cost_ms(RENDER_COST_SPLAT_EVALUATION, render_cost_splat_evaluations(plan));
 }
 
-/* Samples of the environment's light: of all the surface, four to a square as wide as the spacing. */
-static inline double render_cost_sky_samples(const struct render_plan *plan)
+/* Surface in squares as wide as the samples' spacing. */
+static inline double render_cost_sky_squares(const struct render_plan *plan)
 {
     double count = 0;
     for (size_t i = 0; i < plan->media->object_count; i++) {
         const double spacing_mm = plan->objects[i].spacing_mm;
         if (spacing_mm > 0)
-            count += 5 * plan->media->area_mm2[i] / (spacing_mm * spacing_mm);
+            count += plan->media->area_mm2[i] / (spacing_mm * spacing_mm);
     }
     return count;
+}
+
+/* Samples of the environment's light: cubes of 0.7 of the spacing that a curved surface passes through, two
+ * to a square on a plane along the axes. */
+static inline double render_cost_sky_samples(const struct render_plan *plan)
+{
+    return plan->has_environment ? 3 * render_cost_sky_squares(plan) : 0;
 }
 
 static inline double render_cost_rays_ms(const struct render_plan *plan, int ray_count)
@@ -147,11 +182,30 @@ static inline double render_cost_rays_ms(const struct render_plan *plan, int ray
     return render_cost_ms(RENDER_COST_RAY * ray_count, render_cost_sky_samples(plan));
 }
 
+/* Of triangles; and what hides the environment from their samples, if that is asked for. */
 static inline double render_cost_sky_samples_ms(const struct render_plan *plan)
 {
-    const double harmonics = (plan->environment_order + 1.0) * (plan->environment_order + 1.0);
-    return render_cost_ms(RENDER_COST_SKY_SAMPLE + RENDER_COST_HARMONIC * harmonics,
-                          render_cost_sky_samples(plan) + (double)plan->triangle_count);
+    return render_cost_ms(RENDER_COST_SKY_SAMPLE, render_cost_sky_samples(plan)) +
+           render_cost_ms(RENDER_COST_SKY_TRIANGLE, (double)plan->triangle_count) +
+           render_cost_rays_ms(plan, plan->visibility_ray_count);
+}
+
+/* The same of layers peeled along so many axes: of a convex body three, the last of which shows nothing.
+ * Along three, texels of facets that face another axis more are left out. */
+static inline double render_cost_sky_peel_ms(const struct render_plan *plan)
+{
+    const double views = 3 * plan->peel_axis_count;
+    const double share = RENDER_PEEL_SHARE * RENDER_PEEL_SHARE;
+    double texels = 0;
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const double side_px = render_plan_peel_side_px(plan, i);
+        texels += side_px * side_px;
+    }
+    return render_cost_ms(views * RENDER_COST_PEEL_TEXEL, texels) +
+           render_cost_ms(views * RENDER_COST_PEEL_TRIANGLE, (double)plan->triangle_count) +
+           render_cost_ms((plan->peel_axis_count == 1 ? 0.5 : 0.83) / share * RENDER_COST_SKY_PATCH,
+                          render_cost_sky_squares(plan)) +
+           render_cost_rays_ms(plan, plan->visibility_ray_count);
 }
 
 /* Light samples of all lights, about. */
@@ -164,23 +218,30 @@ static inline double render_cost_samples(const struct render_plan *plan)
         if (spacing_mm > 0)
             count += 0.5 * plan->media->area_mm2[i] / (spacing_mm * spacing_mm);
     }
-    return excess * (double)plan->lit_count * count;
+    return excess * (double)plan->lit_count * count + render_cost_sky_samples(plan);
 }
 
 /* The same of gathering: the finest band at each pixel, others at a third as many places in all. */
-static inline double render_cost_gather_evaluations(const struct render_plan *plan)
+static inline double render_cost_gather_evaluations(const struct render_plan *plan,
+                                                    enum render_gather gather)
 {
-    const double pi = 3.14159265358979323846, excess = 2.5;
+    const double pi = 3.14159265358979323846, excess = 2.5, around = plan->has_environment ? 1 : 0;
     double count = 0;
     for (size_t i = 0; i < plan->media->object_count; i++) {
         const struct render_plan_object *const object = &plan->objects[i];
         const struct render_plan_medium *const medium = &plan->of_medium[object->medium];
         const double lit_mm2 = 0.5 * plan->media->area_mm2[i];
+        const double share =
+            gather == RENDER_GATHER_C && render_medium_is_grey(&plan->media->media[object->medium])
+                ? RENDER_COST_GREY_SHARE
+                : 1;
         for (int b = 0; b < medium->band_count && b < 2; b++) {
             const struct render_band *const band = &medium->bands[b];
-            const double area_mm2 = fmin(pi * band->r_outer_mm * band->r_outer_mm, lit_mm2);
-            count +=
-                (b == 0 ? 1 : 0.6) * object->pixel_count * area_mm2 / (band->spacing_mm * band->spacing_mm);
+            const double reached_mm2 = pi * band->r_outer_mm * band->r_outer_mm;
+            const double area_mm2 = (plan->lit_count > 0 || around == 0 ? fmin(reached_mm2, lit_mm2) : 0) +
+                                    around * fmin(reached_mm2, 2 * lit_mm2);
+            count += share * (b == 0 ? 1 : 0.6) * object->pixel_count * area_mm2 /
+                     (band->spacing_mm * band->spacing_mm);
         }
     }
     return excess * count;
@@ -189,11 +250,10 @@ static inline double render_cost_gather_evaluations(const struct render_plan *pl
 static inline double render_cost_gather_ms(const struct render_plan *plan, enum render_gather gather,
                                            bool has_gpu)
 {
-    const double evaluations = render_cost_gather_evaluations(plan);
+    const double evaluations = render_cost_gather_evaluations(plan, gather);
     const double samples_ms = render_cost_ms(RENDER_COST_GATHER_SAMPLE, render_cost_samples(plan));
     if (gather == RENDER_GATHER_GL)
-        return RENDER_COST_PROGRAM_MS + samples_ms +
-               render_cost_ms(RENDER_COST_GATHER_PLACE, plan->covered_px) +
+        return samples_ms + render_cost_ms(RENDER_COST_GATHER_PLACE, plan->covered_px) +
                render_cost_ms((has_gpu ? RENDER_COST_GPU_SHARE : 1) * RENDER_COST_GATHER_GL, evaluations);
     return samples_ms + render_cost_ms(RENDER_COST_GATHER_PIXEL, plan->covered_px) +
            render_cost_ms(RENDER_COST_GATHER_EVALUATION, evaluations) +

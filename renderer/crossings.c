@@ -1,6 +1,7 @@
 #include "renderer/crossings.h"
 
 #include "renderer/blocker.h"
+#include "renderer/passage.h"
 
 #include <stdlib.h>
 
@@ -35,9 +36,11 @@ static struct render_segment segment_of(const struct io_blocker *blocker, double
 {
     struct render_segment segment = { .z0_mm = z0_mm, .ze_mm = ze_mm };
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        segment.alpha[c] = blocker->has_extinction ? render_blocker_alpha(blocker->extinction_per_mm[c],
-                                                                          (ze_mm - z0_mm) * mm_per_depth)
-                                                   : blocker->opacity[c];
+        segment.alpha[c] =
+            blocker->passage ? 1 - render_passage_left(blocker->passage, (ze_mm - z0_mm) * mm_per_depth, c)
+            : blocker->has_extinction
+                ? render_blocker_alpha(blocker->extinction_per_mm[c], (ze_mm - z0_mm) * mm_per_depth)
+                : blocker->opacity[c];
     return segment;
 }
 
@@ -104,11 +107,27 @@ size_t render_crossings_pair(const struct io_blocker *blockers, struct render_cr
 bool render_blocker_is_opaque(const struct io_blocker *blocker)
 {
     const double *const opacity = blocker->opacity;
-    return !blocker->has_extinction && opacity[0] >= 1 && opacity[1] >= 1 && opacity[2] >= 1;
+    return !blocker->passage && !blocker->has_extinction && opacity[0] >= 1 && opacity[1] >= 1 &&
+           opacity[2] >= 1;
+}
+
+static bool is_coloured_passage(const struct io_passage *passage)
+{
+    for (int c = 1; c < IO_CHANNEL_COUNT; c++) {
+        if (passage->counts[c] != passage->counts[0])
+            return true;
+        for (int i = 0; i < passage->counts[0]; i++) {
+            if (passage->depth[c][i] != passage->depth[0][i])
+                return true;
+        }
+    }
+    return false;
 }
 
 bool render_blocker_is_coloured(const struct io_blocker *blocker)
 {
+    if (blocker->passage)
+        return is_coloured_passage(blocker->passage);
     const double *const value = blocker->has_extinction ? blocker->extinction_per_mm : blocker->opacity;
     return value[0] != value[1] || value[1] != value[2];
 }
@@ -116,5 +135,5 @@ bool render_blocker_is_coloured(const struct io_blocker *blocker)
 bool render_blocker_is_there(const struct io_blocker *blocker)
 {
     const double *const value = blocker->has_extinction ? blocker->extinction_per_mm : blocker->opacity;
-    return value[0] > 0 || value[1] > 0 || value[2] > 0;
+    return blocker->passage || value[0] > 0 || value[1] > 0 || value[2] > 0;
 }

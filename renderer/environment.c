@@ -11,8 +11,6 @@
 
 enum {
     ROW_POINTS = 8, /* of Gauss's rule on a part of a row that is a radian or less of the highest order */
-    KERNEL_POINTS = RENDER_RULE_LIMIT, /* of Gauss's rule on each panel, exact for degree 127            */
-    KERNEL_PANELS = 40,                /* each half as wide as the one before                            */
     ORDERS = RENDER_HARMONIC_LIMIT + 1,
 };
 
@@ -54,6 +52,11 @@ static bool take_pixels(const struct io_image *image, const double rgb[3], const
                     return dipole_fail(status, DIPOLE_BAD_VALUE, place,
                                        "the map holds %g in pixel (%d, %d), expected finite radiance",
                                        value, x, y);
+                if (!(rgb[c] * value <= RENDER_ENVIRONMENT_RADIANCE_LIMIT))
+                    return dipole_fail(status, DIPOLE_BAD_VALUE, place,
+                                       "the map's radiance, scaled, is %g in pixel (%d, %d), expected at "
+                                       "most %g",
+                                       rgb[c] * value, x, y, RENDER_ENVIRONMENT_RADIANCE_LIMIT);
                 positive += sr * fmax(value, 0);
                 negative += sr * fmax(-value, 0);
                 environment->radiance[3 * index + c] = (float)(rgb[c] * fmax(value, 0));
@@ -76,28 +79,63 @@ struct waves {
 
 struct projection {
     struct render_environment *environment;
-    double (*columns)[2]; /* of each order and column */
+    size_t quarter;       /* columns of a quarter of a row, the one in the middle with them */
+    double (*columns)[2]; /* of each order and column of a quarter, before the map is turned */
+    double turns[ORDERS][2];
     struct waves *rows;
 };
+
+/* Sums over the four columns where cosines of even m, of odd m, sines of even m, of odd m are the same but
+ * for their sign; at most RENDER_ENVIRONMENT_SIDE_LIMIT / 4 of each, 196 kB. */
+enum { COSINES_EVEN, COSINES_ODD, SINES_EVEN, SINES_ODD, FOLDS };
+struct folded {
+    double sums[FOLDS][RENDER_ENVIRONMENT_SIDE_LIMIT / 4 + 1][3];
+};
+
+/* phi is that of column x, pi - phi of the one as far before half of the row, phi - pi and -phi of those
+ * half a row on. */
+static void fold_row(const float *pixels, size_t width, size_t quarter, struct folded *folded)
+{
+    const size_t half = width / 2;
+    for (size_t x = 0; x < quarter; x++) {
+        const size_t mirrored = half - 1 - x;
+        const double weight = mirrored == x ? 0.5 : 1; /* the middle of an odd half is its own mirror */
+        for (size_t c = 0; c < 3; c++) {
+            const double at = (double)pixels[3 * x + c], across = (double)pixels[3 * (x + half) + c];
+            const double mirror = (double)pixels[3 * mirrored + c],
+                         opposite = (double)pixels[3 * (mirrored + half) + c];
+            folded->sums[COSINES_EVEN][x][c] = weight * (at + across + mirror + opposite);
+            folded->sums[COSINES_ODD][x][c] = weight * (at - across - mirror + opposite);
+            folded->sums[SINES_EVEN][x][c] = weight * (at + across - mirror - opposite);
+            folded->sums[SINES_ODD][x][c] = weight * (at - across + mirror - opposite);
+        }
+    }
+}
 
 static void add_row(void *context, int row)
 {
     const struct projection *const projection = context;
     const struct render_environment *const environment = projection->environment;
-    const size_t width = (size_t)environment->width_px;
-    const float *const pixels = environment->radiance + 3 * width * (size_t)row;
+    const size_t width = (size_t)environment->width_px, quarter = projection->quarter;
     struct waves *const waves = &projection->rows[row];
+    struct folded folded;
+    fold_row(environment->radiance + 3 * width * (size_t)row, width, quarter, &folded);
     for (size_t m = 0; m < ORDERS; m++) {
-        const double(*const columns)[2] = (const double(*)[2])projection->columns + m * width;
+        const double(*const columns)[2] = (const double(*)[2])projection->columns + m * quarter;
+        const double(*const even)[3] = (const double(*)[3])folded.sums[m % 2 ? COSINES_ODD : COSINES_EVEN];
+        const double(*const odd)[3] = (const double(*)[3])folded.sums[m % 2 ? SINES_ODD : SINES_EVEN];
         double along[3] = { 0 }, across[3] = { 0 };
-        for (size_t x = 0; x < width; x++) {
+        for (size_t x = 0; x < quarter; x++) {
             for (size_t c = 0; c < 3; c++) {
-                along[c] += (double)pixels[3 * x + c] * columns[x][0];
-                across[c] += (double)pixels[3 * x + c] * columns[x][1];
+                along[c] += even[x][c] * columns[x][0];
+                across[c] += odd[x][c] * columns[x][1];
             }
         }
-        memcpy(waves->along[m], along, sizeof along);
-        memcpy(waves->across[m], across, sizeof across);
+        const double cosine = projection->turns[m][0], sine = projection->turns[m][1];
+        for (size_t c = 0; c < 3; c++) {
+            waves->along[m][c] = along[c] * cosine - across[c] * sine;
+            waves->across[m][c] = across[c] * cosine + along[c] * sine;
+        }
     }
 }
 
@@ -107,13 +145,17 @@ static double longitude(const struct render_environment *environment, double x)
     return PI - 2 * PI * x / environment->width_px + environment->rotate_rad;
 }
 
-static void integrate_columns(const struct render_environment *environment, double (*columns)[2])
+static void integrate_columns(struct projection *projection)
 {
+    const struct render_environment *const environment = projection->environment;
     const double width_rad = 2 * PI / environment->width_px;
+    double(*columns)[2] = projection->columns;
     for (int m = 0; m < ORDERS; m++) {
         const double half = 0.5 * m * width_rad, chord = m > 0 ? width_rad * sin(half) / half : width_rad;
-        for (int x = 0; x < environment->width_px; x++, columns++) {
-            const double phi = m * longitude(environment, x + 0.5);
+        projection->turns[m][0] = cos(m * environment->rotate_rad);
+        projection->turns[m][1] = sin(m * environment->rotate_rad);
+        for (size_t x = 0; x < projection->quarter; x++, columns++) {
+            const double phi = m * (PI - width_rad * ((double)x + 0.5));
             (*columns)[0] = chord * cos(phi);
             (*columns)[1] = chord * sin(phi);
         }
@@ -189,13 +231,15 @@ static void find_power(struct render_environment *environment)
 static bool project(struct render_environment *environment, dipole_status *status)
 {
     const size_t width = (size_t)environment->width_px, height = (size_t)environment->height_px;
+    const size_t quarter = (height + 1) / 2;
     struct projection projection = { .environment = environment,
-                                     .columns = calloc(ORDERS * width, sizeof *projection.columns),
+                                     .quarter = quarter,
+                                     .columns = calloc(ORDERS * quarter, sizeof *projection.columns),
                                      .rows = calloc(height, sizeof *projection.rows) };
     const bool done = projection.columns && projection.rows;
     if (done) {
         render_harmonics_init(&environment->harmonics);
-        integrate_columns(environment, projection.columns);
+        integrate_columns(&projection);
         lut_parallel_for(environment->height_px, 0, add_row, &projection);
         for (int y = 0; y < environment->height_px; y++)
             add_waves(environment, y, &projection.rows[y]);
@@ -220,6 +264,7 @@ bool render_environment_create(const struct io_image *image, const double rgb[3]
         environment->width_px = image->width_px;
         environment->height_px = image->height_px;
         environment->rotate_rad = rotate_rad;
+        memcpy(environment->rgb, rgb, sizeof environment->rgb);
         environment->radiance = malloc(3 * pixel_count * sizeof *environment->radiance);
         environment->coefficients = calloc(RENDER_HARMONIC_COUNT, sizeof *environment->coefficients);
     }
@@ -288,125 +333,4 @@ void render_environment_direction(const struct render_environment *environment, 
     direction[0] = sin(theta) * sin(phi);
     direction[1] = cos(theta);
     direction[2] = sin(theta) * cos(phi);
-}
-
-/* ---- the kernel --------------------------------------------------------------------------------- */
-
-static void add_point(double eta, double cosine, double weight, struct render_kernel *kernel)
-{
-    const double value = (1 - dipole_fresnel_reflectance(eta, cosine)) * cosine;
-    double p = 1, before = 0;
-    for (int l = 0; l < ORDERS; l++) {
-        kernel->transfer[l] += 2 * PI * weight * value * p;
-        const double next = ((2.0 * l + 1) * cosine * p - l * before) / (l + 1);
-        before = p;
-        p = next;
-    }
-    kernel->square += 2 * PI * weight * value * value;
-}
-
-/*
- * F_t is analytic in the cosine but for where the square root of eta^2 - 1 + mu^2 begins: at total
- * reflection, or close to 0 for an eta just above 1. Panels are finer and finer toward it; where it lies in
- * the range the variable is the root itself.
- */
-void render_kernel_init(double eta, struct render_kernel *kernel)
-{
-    double points[KERNEL_POINTS], weights[KERNEL_POINTS];
-    const double least = eta < 1 ? sqrt((1 - eta) * (1 + eta)) : 0;
-    render_legendre_rule(KERNEL_POINTS, points, weights);
-    *kernel = (struct render_kernel){ .square = 0 };
-    for (int panel = 0; panel < KERNEL_PANELS; panel++) {
-        const double end = ldexp(1, -panel), begin = panel + 1 < KERNEL_PANELS ? 0.5 * end : 0;
-        for (int i = 0; i < KERNEL_POINTS; i++) {
-            const double half = 0.5 * (end - begin), u = begin + half * (1 + points[i]);
-            const double cosine = eta < 1 ? least + (1 - least) * u * u : u;
-            const double slope = eta < 1 ? 2 * (1 - least) * u : 1;
-            add_point(eta, fmin(cosine, 1), half * weights[i] * slope, kernel);
-        }
-    }
-}
-
-/* ---- irradiance --------------------------------------------------------------------------------- */
-
-double render_irradiance_error(const struct render_environment *environment,
-                               const struct render_kernel *kernel, int order)
-{
-    double largest = 0, square = kernel->square;
-    for (int l = 0; l < ORDERS; l++)
-        square -= (2 * l + 1) / (4 * PI) * kernel->transfer[l] * kernel->transfer[l];
-    for (int c = 0; c < 3; c++) {
-        double sum = fmax(square, 0) * environment->rest[c] / (2 * ORDERS + 1);
-        for (int l = order + 1; l < ORDERS; l++)
-            sum += kernel->transfer[l] * kernel->transfer[l] * environment->power[l][c] / (4 * PI);
-        if (environment->mean[c] > 0)
-            largest = fmax(largest, sqrt(sum) / (kernel->transfer[0] * environment->mean[c]));
-    }
-    return largest;
-}
-
-static bool create(const struct render_environment *environment, double eta,
-                   const struct render_kernel *kernel, int order, struct render_irradiance **irradiance_out,
-                   dipole_status *status)
-{
-    const size_t count = (size_t)(order + 1) * (size_t)(order + 1);
-    struct render_irradiance *const irradiance = calloc(1, sizeof *irradiance);
-    double(*const coefficients)[3] = calloc(count, sizeof *coefficients);
-    if (!irradiance || !coefficients) {
-        free(irradiance);
-        free(coefficients);
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu harmonics", count);
-    }
-    *irradiance = (struct render_irradiance){ .environment = environment,
-                                              .eta = eta,
-                                              .order = order,
-                                              .error = render_irradiance_error(environment, kernel, order),
-                                              .coefficients = coefficients };
-    for (int l = 0; l <= order; l++) {
-        for (int i = l * l; i < (l + 1) * (l + 1); i++) {
-            for (int c = 0; c < 3; c++)
-                coefficients[i][c] = kernel->transfer[l] * environment->coefficients[i][c];
-        }
-    }
-    for (int c = 0; c < 3; c++)
-        irradiance->mean[c] = kernel->transfer[0] * environment->mean[c];
-    *irradiance_out = irradiance;
-    return true;
-}
-
-bool render_irradiance_create_of_order(const struct render_environment *environment, double eta, int order,
-                                       struct render_irradiance **irradiance_out, dipole_status *status)
-{
-    struct render_kernel kernel;
-    *irradiance_out = NULL;
-    render_kernel_init(eta, &kernel);
-    return create(environment, eta, &kernel, order, irradiance_out, status);
-}
-
-bool render_irradiance_create(const struct render_environment *environment, double eta, double epsilon,
-                              struct render_irradiance **irradiance_out, dipole_status *status)
-{
-    struct render_kernel kernel;
-    int order = 0;
-    *irradiance_out = NULL;
-    render_kernel_init(eta, &kernel);
-    while (order < RENDER_HARMONIC_LIMIT && render_irradiance_error(environment, &kernel, order) > epsilon)
-        order++;
-    return create(environment, eta, &kernel, order, irradiance_out, status);
-}
-
-void render_irradiance_destroy(struct render_irradiance *irradiance)
-{
-    if (!irradiance)
-        return;
-    free(irradiance->coefficients);
-    free(irradiance);
-}
-
-void render_irradiance_at(const struct render_irradiance *irradiance, const double normal[3], double rgb[3])
-{
-    render_harmonics_sum(&irradiance->environment->harmonics, irradiance->order,
-                         (const double(*)[3])irradiance->coefficients, normal, rgb);
-    for (int c = 0; c < 3; c++)
-        rgb[c] = fmax(rgb[c], 0);
 }

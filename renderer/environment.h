@@ -16,6 +16,9 @@ enum { RENDER_ENVIRONMENT_SIDE_LIMIT = 8192 };
  * the light something else is wrong. */
 #define RENDER_ENVIRONMENT_NEGATIVE_LIMIT 0.01
 
+/* More than any light; what is summed of less stays within single precision. */
+#define RENDER_ENVIRONMENT_RADIANCE_LIMIT 1e30
+
 /*
  * A map, scaled and turned, immutable. The pixel in column x and row y is a patch of the sphere of uniform
  * radiance: latitudes from the top, +y, down; longitudes as OpenEXR has them, +z in the middle of the map
@@ -23,9 +26,9 @@ enum { RENDER_ENVIRONMENT_SIDE_LIMIT = 8192 };
  */
 struct render_environment {
     int width_px, height_px;
-    float *radiance; /* x 3, rows from the top, scaled; in W/(mm^2 sr)          */
-    double rotate_rad;
-    double mean[3]; /* of the radiance over the sphere                          */
+    float *radiance;           /* x 3, rows from the top, scaled; in W/(mm^2 sr)          */
+    double rgb[3], rotate_rad; /* that it was scaled by and turned                        */
+    double mean[3];            /* of the radiance over the sphere                          */
     struct render_harmonics harmonics;
     double (*coefficients)[3];                  /* L_lm, RENDER_HARMONIC_COUNT of them           */
     double power[RENDER_HARMONIC_LIMIT + 1][3]; /* sum over m of L_lm^2                          */
@@ -34,8 +37,8 @@ struct render_environment {
 
 /*
  * Take a picture of radiance, of 1, 3 or 4 channels, alpha ignored. image is left as it is; place is what
- * messages name. Fails with DIPOLE_BAD_VALUE: not twice as wide as high, too large, not finite, or negative
- * by more than RENDER_ENVIRONMENT_NEGATIVE_LIMIT.
+ * messages name. Fails with DIPOLE_BAD_VALUE: not twice as wide as high, too large, not finite, brighter
+ * than RENDER_ENVIRONMENT_RADIANCE_LIMIT, or negative by more than RENDER_ENVIRONMENT_NEGATIVE_LIMIT.
  */
 DIPOLE_CHECKED bool render_environment_create(const struct io_image *image, const double rgb[3],
                                               double rotate_rad, const dipole_place *place,

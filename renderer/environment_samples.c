@@ -24,7 +24,7 @@ enum {
 struct cell {
     uint64_t code; /* of the cube, on the curve                              */
     int face;      /* axis that the facets face most, times 2; plus 1: down it */
-    float min_mm[3], max_mm[3], extent_mm;
+    float min_mm[3], max_mm[3];
     double flux_w[3], moment[3], weight, area_mm2;
     struct render_patch largest;
 };
@@ -35,7 +35,7 @@ struct waiting {
 };
 
 struct render_patches {
-    const struct render_irradiance *irradiance;
+    const struct render_irradiance_table *irradiance;
     double min_mm[3], spacing_mm;
     struct cell *cells;
     size_t cell_count, cell_capacity;
@@ -45,7 +45,7 @@ struct render_patches {
     const struct render_visibility *visibility; /* of finish */
 };
 
-bool render_patches_create(const struct render_irradiance *irradiance, const double min_mm[3],
+bool render_patches_create(const struct render_irradiance_table *irradiance, const double min_mm[3],
                            double spacing_mm, struct render_patches **patches_out, dipole_status *status)
 {
     *patches_out = NULL;
@@ -155,14 +155,13 @@ static bool put(struct render_patches *patches, const struct waiting *lit, dipol
     const double weight = patch->area_mm2 * (lit->rgb[0] + lit->rgb[1] + lit->rgb[2]);
     cell->weight += weight;
     cell->area_mm2 += patch->area_mm2;
-    cell->extent_mm = fmaxf(cell->extent_mm, (float)patch->extent_mm);
     if (!(patch->area_mm2 <= cell->largest.area_mm2))
         cell->largest = *patch;
     for (int k = 0; k < 3; k++) {
         cell->flux_w[k] += patch->area_mm2 * lit->rgb[k];
         cell->moment[k] += weight * patch->position_mm[k];
-        cell->min_mm[k] = fminf(cell->min_mm[k], (float)patch->position_mm[k]);
-        cell->max_mm[k] = fmaxf(cell->max_mm[k], (float)patch->position_mm[k]);
+        cell->min_mm[k] = patch->min_mm[k] < cell->min_mm[k] ? patch->min_mm[k] : cell->min_mm[k];
+        cell->max_mm[k] = patch->max_mm[k] > cell->max_mm[k] ? patch->max_mm[k] : cell->max_mm[k];
     }
     return true;
 }
@@ -171,8 +170,8 @@ static void light_some(void *context, int part)
 {
     struct render_patches *const patches = context;
     for (int i = part * LIT_AT_ONCE; i < (part + 1) * LIT_AT_ONCE && i < patches->waiting_count; i++)
-        render_irradiance_at(patches->irradiance, patches->waiting[i].patch.normal,
-                             patches->waiting[i].rgb);
+        render_irradiance_table_at(patches->irradiance, patches->waiting[i].patch.normal,
+                                   patches->waiting[i].rgb);
 }
 
 static bool flush(struct render_patches *patches, dipole_status *status)
@@ -196,110 +195,162 @@ bool render_patches_add(struct render_patches *patches, const struct render_patc
 
 /* ---- triangles ---------------------------------------------------------------------------------- */
 
-/* Part of a triangle, by the weights of its corners. */
-struct piece {
-    double weights[3][3];
+/* Of a part of a triangle: weights of the triangle's corners, and where that is, in cubes. */
+struct corner {
+    double weights[3], at[3];
+    int64_t cube[3];
 };
 
 /* Pieces of one triangle that fall one after the other into one cube have one normal for their light: it
  * hardly differs. */
 struct cutter {
     struct render_patches *patches;
-    const struct io_mesh *mesh;
-    size_t triangle;
-    double corners_mm[3][3], area_mm2, limit_mm;
-    uint64_t code; /* of the pieces gathered                        */
-    double gathered_mm2, weights[3], extent_mm;
+    double cube_mm, limit2; /* square of the longest side, in cubes, that need not be cut */
+    double corners_mm[3][3], normals[3][3], facet_normal[3];
+    int64_t cube[3]; /* of the pieces gathered */
+    double gathered_mm2, weights[3], min[3], max[3];
     dipole_status *status;
 };
+
+static void place(struct corner *corner)
+{
+    for (int k = 0; k < 3; k++)
+        corner->cube[k] = (int64_t)corner->at[k];
+}
 
 static bool add_gathered(struct cutter *cutter)
 {
     if (!(cutter->gathered_mm2 > 0))
         return true;
-    struct render_surface_point point;
-    for (int i = 0; i < 3; i++)
-        cutter->weights[i] /= cutter->gathered_mm2;
-    render_triangle_point(cutter->mesh, cutter->triangle, cutter->weights, &point);
-    struct render_patch patch = { .area_mm2 = cutter->gathered_mm2, .extent_mm = cutter->extent_mm };
-    memcpy(patch.position_mm, point.position_mm, sizeof patch.position_mm);
-    memcpy(patch.normal, point.normal, sizeof patch.normal);
-    memcpy(patch.facet_normal, point.facet_normal, sizeof patch.facet_normal);
-    if (!(render_dot(patch.normal, patch.normal) > 0)) /* normals of the corners that cancel */
+    struct render_patch patch = { .area_mm2 = cutter->gathered_mm2 };
+    memcpy(patch.facet_normal, cutter->facet_normal, sizeof patch.facet_normal);
+    for (int i = 0; i < 3; i++) {
+        const double weight = cutter->weights[i] / cutter->gathered_mm2;
+        for (int k = 0; k < 3; k++) {
+            patch.position_mm[k] += weight * cutter->corners_mm[i][k];
+            patch.normal[k] += weight * cutter->normals[i][k];
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        patch.min_mm[k] = (float)(cutter->patches->min_mm[k] + cutter->cube_mm * cutter->min[k]);
+        patch.max_mm[k] = (float)(cutter->patches->min_mm[k] + cutter->cube_mm * cutter->max[k]);
+    }
+    const double length2 = render_dot(patch.normal, patch.normal);
+    if (length2 > 0) {
+        for (int k = 0; k < 3; k++)
+            patch.normal[k] /= sqrt(length2);
+    } else { /* normals of the corners that cancel */
         memcpy(patch.normal, patch.facet_normal, sizeof patch.normal);
-    cutter->gathered_mm2 = cutter->extent_mm = 0;
-    memset(cutter->weights, 0, sizeof cutter->weights);
+    }
+    cutter->gathered_mm2 = 0;
     return render_patches_add(cutter->patches, &patch, cutter->status);
 }
 
-static bool gather(struct cutter *cutter, const struct piece *piece, double extent_mm, double area_mm2)
+/* Begin to gather in a cube. */
+static void begin_cube(struct cutter *cutter, const int64_t cube[3])
 {
-    double middle[3], position_mm[3];
-    for (int i = 0; i < 3; i++)
-        middle[i] = (piece->weights[0][i] + piece->weights[1][i] + piece->weights[2][i]) / 3;
-    for (int k = 0; k < 3; k++)
-        position_mm[k] = middle[0] * cutter->corners_mm[0][k] + middle[1] * cutter->corners_mm[1][k] +
-                         middle[2] * cutter->corners_mm[2][k];
-    const uint64_t code = code_of(cutter->patches, position_mm);
-    if (code != cutter->code && !add_gathered(cutter))
-        return false;
-    cutter->code = code;
+    for (int k = 0; k < 3; k++) {
+        cutter->cube[k] = cube[k];
+        cutter->weights[k] = 0;
+        cutter->min[k] = INFINITY;
+        cutter->max[k] = -INFINITY;
+    }
+}
+
+static bool gather(struct cutter *cutter, const struct corner *const corners[3], const int64_t cube[3],
+                   double area_mm2)
+{
+    if (!(cutter->gathered_mm2 > 0) || memcmp(cube, cutter->cube, sizeof cutter->cube) != 0) {
+        if (!add_gathered(cutter))
+            return false;
+        begin_cube(cutter, cube);
+    }
     cutter->gathered_mm2 += area_mm2;
-    cutter->extent_mm = fmax(cutter->extent_mm, extent_mm);
-    for (int i = 0; i < 3; i++)
-        cutter->weights[i] += area_mm2 * middle[i];
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++) {
+            cutter->weights[k] += area_mm2 / 3 * corners[i]->weights[k];
+            cutter->min[k] = corners[i]->at[k] < cutter->min[k] ? corners[i]->at[k] : cutter->min[k];
+            cutter->max[k] = corners[i]->at[k] > cutter->max[k] ? corners[i]->at[k] : cutter->max[k];
+        }
+    }
     return true;
 }
 
-/* Halve across the longest side until it is short enough. */
-static bool cut(struct cutter *cutter, const struct piece *piece, double area_mm2, int depth)
+static double distance2(const struct corner *a, const struct corner *b)
 {
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += (a->at[k] - b->at[k]) * (a->at[k] - b->at[k]);
+    return sum;
+}
+
+/* Halve across the longest side until all is in one cube, or that side is short enough. */
+static bool cut(struct cutter *cutter, const struct corner *const corners[3], double area_mm2, int depth)
+{
+    if (memcmp(corners[0]->cube, corners[1]->cube, sizeof corners[0]->cube) == 0 &&
+        memcmp(corners[0]->cube, corners[2]->cube, sizeof corners[0]->cube) == 0)
+        return gather(cutter, corners, corners[0]->cube, area_mm2);
+    struct corner middle;
     double longest2 = -1;
     int tip = 0;
     for (int i = 0; i < 3; i++) {
-        double side_mm[3] = { 0 };
-        for (int j = 0; j < 3; j++) {
-            const double part = piece->weights[(i + 1) % 3][j] - piece->weights[(i + 2) % 3][j];
-            for (int k = 0; k < 3; k++)
-                side_mm[k] += part * cutter->corners_mm[j][k];
-        }
-        const double length2 = render_dot(side_mm, side_mm);
+        const double length2 = distance2(corners[(i + 1) % 3], corners[(i + 2) % 3]);
         if (length2 > longest2) {
             longest2 = length2;
             tip = i;
         }
     }
-    if (longest2 <= cutter->limit_mm * cutter->limit_mm || depth == 0)
-        return gather(cutter, piece, sqrt(longest2), area_mm2);
-    struct piece first, second;
-    for (int j = 0; j < 3; j++) {
-        const double middle = 0.5 * (piece->weights[(tip + 1) % 3][j] + piece->weights[(tip + 2) % 3][j]);
-        first.weights[0][j] = piece->weights[tip][j];
-        first.weights[1][j] = piece->weights[(tip + 1) % 3][j];
-        first.weights[2][j] = second.weights[1][j] = middle;
-        second.weights[0][j] = piece->weights[tip][j];
-        second.weights[2][j] = piece->weights[(tip + 2) % 3][j];
+    if (longest2 <= cutter->limit2 || depth == 0) {
+        for (int k = 0; k < 3; k++)
+            middle.at[k] = (corners[0]->at[k] + corners[1]->at[k] + corners[2]->at[k]) / 3;
+        place(&middle);
+        return gather(cutter, corners, middle.cube, area_mm2);
     }
-    return cut(cutter, &first, 0.5 * area_mm2, depth - 1) &&
-           cut(cutter, &second, 0.5 * area_mm2, depth - 1);
+    const struct corner *const one = corners[(tip + 1) % 3], *const other = corners[(tip + 2) % 3];
+    for (int k = 0; k < 3; k++) {
+        middle.at[k] = 0.5 * (one->at[k] + other->at[k]);
+        middle.weights[k] = 0.5 * (one->weights[k] + other->weights[k]);
+    }
+    place(&middle);
+    const struct corner *const first[3] = { corners[tip], one, &middle }, *const second[3] = { corners[tip],
+                                                                                               &middle,
+                                                                                               other };
+    return cut(cutter, first, 0.5 * area_mm2, depth - 1) && cut(cutter, second, 0.5 * area_mm2, depth - 1);
+}
+
+static bool cut_triangle(struct cutter *cutter, const struct io_mesh *mesh, size_t triangle)
+{
+    struct corner corners[3];
+    double normal[3];
+    render_triangle_corners(mesh, triangle, cutter->corners_mm);
+    render_triangle_normal((const double(*)[3])cutter->corners_mm, normal);
+    const double length = sqrt(render_dot(normal, normal));
+    if (!(length > 0))
+        return true;
+    for (size_t i = 0; i < 3; i++) {
+        const float *const n = mesh->normals + 3 * (size_t)mesh->indices[3 * triangle + i];
+        cutter->facet_normal[i] = normal[i] / length;
+        for (size_t k = 0; k < 3; k++) {
+            cutter->normals[i][k] = (double)n[k];
+            corners[i].weights[k] = i == k;
+            corners[i].at[k] = (cutter->corners_mm[i][k] - cutter->patches->min_mm[k]) / cutter->cube_mm;
+        }
+        place(&corners[i]);
+    }
+    const struct corner *const whole[3] = { &corners[0], &corners[1], &corners[2] };
+    return cut(cutter, whole, 0.5 * length, CUT_DEPTH) && add_gathered(cutter);
 }
 
 bool render_patches_add_mesh(struct render_patches *patches, const struct io_mesh *mesh,
                              dipole_status *status)
 {
-    const struct piece whole = { .weights = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } } };
+    const double limit = RENDER_PATCH_SHARE / CUBE_SHARE;
+    struct cutter cutter = { .patches = patches,
+                             .cube_mm = CUBE_SHARE * patches->spacing_mm,
+                             .limit2 = limit * limit,
+                             .status = status };
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        struct cutter cutter = { .patches = patches,
-                                 .mesh = mesh,
-                                 .triangle = t,
-                                 .limit_mm = RENDER_PATCH_SHARE * patches->spacing_mm,
-                                 .status = status };
-        double normal[3];
-        render_triangle_corners(mesh, t, cutter.corners_mm);
-        render_triangle_normal((const double(*)[3])cutter.corners_mm, normal);
-        cutter.area_mm2 = 0.5 * sqrt(render_dot(normal, normal));
-        if (cutter.area_mm2 > 0 &&
-            (!cut(&cutter, &whole, cutter.area_mm2, CUT_DEPTH) || !add_gathered(&cutter)))
+        if (!cut_triangle(&cutter, mesh, t))
             return false;
     }
     return true;
@@ -354,7 +405,7 @@ bool render_patches_finish(struct render_patches *patches, float object,
             sample.flux_w[k] = (float)cell->flux_w[k];
             diagonal2 += width_mm * width_mm;
         }
-        sample.footprint_mm = (float)sqrt(diagonal2) + cell->extent_mm;
+        sample.footprint_mm = (float)sqrt(diagonal2);
         done = render_light_samples_add(samples, &sample, status);
     }
     return done;

@@ -5,8 +5,8 @@
 #ifndef RENDERER_ENVIRONMENT_SAMPLES_H
 #define RENDERER_ENVIRONMENT_SAMPLES_H
 
-#include "renderer/environment.h"
 #include "renderer/environment_visibility.h"
+#include "renderer/irradiance_table.h"
 #include "renderer/light_samples.h"
 
 /* A bit of surface with one normal for its light. */
@@ -14,7 +14,8 @@ struct render_patch {
     double position_mm[3];  /* its middle                                             */
     double normal[3];       /* unit, interpolated: what its light depends on          */
     double facet_normal[3]; /* unit, of its triangle: tells sheets and edges apart    */
-    double area_mm2, extent_mm;
+    double area_mm2;
+    float min_mm[3], max_mm[3]; /* a box that holds it */
 };
 
 /* Patches of one object on their way to samples. */
@@ -24,7 +25,7 @@ struct render_patches;
  * irradiance must outlive it; samples are at most spacing_mm wide along each axis, as long as patches are
  * at most RENDER_PATCH_SHARE of that. Fails with DIPOLE_OUT_OF_MEMORY.
  */
-DIPOLE_CHECKED bool render_patches_create(const struct render_irradiance *irradiance,
+DIPOLE_CHECKED bool render_patches_create(const struct render_irradiance_table *irradiance,
                                           const double min_mm[3], double spacing_mm,
                                           struct render_patches **patches_out, dipole_status *status);
 void render_patches_destroy(struct render_patches *patches);

@@ -235,18 +235,22 @@ void render_executor_destroy(struct render_executor *executor)
     free(executor);
 }
 
+void render_executor_forget_tables(struct render_executor *executor)
+{
+    render_splatter_destroy(executor->splatter);
+    render_gatherer_destroy(executor->gatherer);
+    render_tsm_destroy(executor->tsm);
+    executor->splatter = NULL;
+    executor->gatherer = NULL;
+    executor->tsm = NULL;
+}
+
 void render_executor_renew_materials(struct render_executor *executor, const struct io_scene *scene)
 {
     for (size_t i = 0; i < executor->mesh_count; i++)
         executor->meshes[i].roughness = roughness_of(&scene->objects[i]);
-    /* All know their tables by address, where others may come to lie. */
-    render_splatter_destroy(executor->splatter);
-    render_gatherer_destroy(executor->gatherer);
-    render_tsm_destroy(executor->tsm);
+    render_executor_forget_tables(executor);
     render_sky_destroy(executor->sky);
-    executor->splatter = NULL;
-    executor->gatherer = NULL;
-    executor->tsm = NULL;
     executor->sky = NULL;
 }
 
@@ -345,6 +349,8 @@ static void texture_size(const struct render_plan *plan, const struct render_tex
         for (size_t v = 0; v < plan->view_count; v++)
             largest = plan->views[v].size_px > largest ? plan->views[v].size_px : largest;
         *width_px = *height_px = (largest + block_px - 1) / block_px;
+    } else if (kind->size == RENDER_SIZE_MAP_BLOCKS) {
+        *width_px = *height_px = (render_plan_map_side_px(plan) + RENDER_MAP_BLOCK - 1) / RENDER_MAP_BLOCK;
     } else if (kind->size == RENDER_SIZE_SHADOW) {
         *width_px = *height_px = plan->shadows.size_px;
     } else if (kind->size == RENDER_SIZE_SHADOW_BLOCKS) {
@@ -479,7 +485,7 @@ bool render_executor_need_sky(const struct render_frame *frame, struct render_sk
                               dipole_status *status)
 {
     struct render_executor *const executor = frame->executor;
-    if (!executor->sky && !render_sky_create(&executor->sky, status))
+    if (!executor->sky && !render_sky_create(frame->plan->media, &executor->sky, status))
         return false;
     *sky_out = executor->sky;
     return true;

@@ -29,6 +29,10 @@ DIPOLE_CHECKED bool render_executor_create(const struct io_scene *scene, struct 
                                            struct render_executor **executor_out, dipole_status *status);
 void render_executor_destroy(struct render_executor *executor);
 
+/* Forget what was made of tables and volumes, which are known by address: before those are freed, as others
+ * may come to lie there. Context current. */
+void render_executor_forget_tables(struct render_executor *executor);
+
 /* Forget what was made of the media, and take the objects' roughness again. Context current. */
 void render_executor_renew_materials(struct render_executor *executor, const struct io_scene *scene);
 

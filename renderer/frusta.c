@@ -84,3 +84,50 @@ size_t render_frusta_of_point(const double position_mm[3], const struct render_b
     make_faces(&view, out);
     return RENDER_FACES;
 }
+
+/* Of all vertices: right and up at distance 1, and depth. */
+static struct box slopes_of(const struct render_projection *view, const struct io_object *objects,
+                            size_t count)
+{
+    struct box box = { { INFINITY, INFINITY, INFINITY }, { -INFINITY, -INFINITY, -INFINITY } };
+    for (size_t i = 0; i < count; i++) {
+        const struct io_mesh *const mesh = objects[i].mesh;
+        for (size_t v = 0; v < mesh->vertex_count; v++) {
+            const float *const p = &mesh->positions[3 * v];
+            const double position_mm[3] = { (double)p[0], (double)p[1], (double)p[2] };
+            double at[3];
+            render_projection_to_view(view, position_mm, at);
+            at[0] /= at[2];
+            at[1] /= at[2];
+            for (int k = 0; k < 3; k++) {
+                box.min[k] = fmin(box.min[k], at[k]);
+                box.max[k] = fmax(box.max[k], at[k]);
+            }
+        }
+    }
+    return box;
+}
+
+void render_frustum_narrow(const struct io_object *objects, size_t count, double margin,
+                           struct render_projection *view)
+{
+    struct render_projection narrow = *view;
+    double forward[3], aside[2];
+    const struct box before = slopes_of(view, objects, count);
+    for (int k = 0; k < 2; k++)
+        aside[k] = tan(0.5 * (atan(before.min[k]) + atan(before.max[k])));
+    for (int k = 0; k < 3; k++)
+        forward[k] = view->forward[k] + aside[0] * view->right[k] + aside[1] * view->up[k];
+    const double length = sqrt(render_dot(forward, forward));
+    for (int k = 0; k < 3; k++)
+        forward[k] /= length;
+    render_projection_aim(&narrow, forward, up);
+    const struct box box = slopes_of(&narrow, objects, count);
+    if (!(before.min[2] > 0 && box.min[2] > 0))
+        return;
+    const double half = fmax(fmax(-box.min[0], box.max[0]), fmax(-box.min[1], box.max[1])) * margin;
+    narrow.half_width = narrow.half_height = fmax(half, 1e-3 * view->half_width);
+    narrow.near_mm = box.min[2] * 0.999;
+    narrow.far_mm = box.max[2] * 1.001;
+    *view = narrow;
+}

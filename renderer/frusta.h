@@ -24,4 +24,11 @@ void render_frustum_of_parallel(const double direction[3], const struct io_objec
 size_t render_frusta_of_point(const double position_mm[3], const struct render_ball *ball, double margin,
                               double half_width, struct render_projection out[RENDER_FACES]);
 
+/*
+ * Turn a perspective view to the middle of what it sees of all vertices of count objects, and narrow it to
+ * them, square and wider by margin. Nothing is done where a vertex would be behind the eye.
+ */
+void render_frustum_narrow(const struct io_object *objects, size_t count, double margin,
+                           struct render_projection *view);
+
 #endif

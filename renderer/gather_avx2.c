@@ -60,7 +60,7 @@ static inline __m256 pick(const float pieces[RENDER_GATHER_PIECES], __m256i piec
 static inline __attribute__((always_inline)) void sum_all(const struct render_gather_kernel *kernel,
                                                           const struct render_gather_source *const *sources,
                                                           size_t count, struct render_gather_places *places,
-                                                          bool has_slopes)
+                                                          bool has_slopes, bool is_grey)
 {
     const __m256 x = _mm256_load_ps(places->position_mm[0]), y = _mm256_load_ps(places->position_mm[1]),
                  z = _mm256_load_ps(places->position_mm[2]);
@@ -104,20 +104,25 @@ static inline __attribute__((always_inline)) void sum_all(const struct render_ga
         const __m256 slope_by_2 = _mm256_add_ps(slope, slope),
                      first_by_4 = _mm256_mul_ps(first, _mm256_set1_ps(4)),
                      second_by_3 = _mm256_mul_ps(second, _mm256_set1_ps(3));
+        __m256 value = one, spread_bend = one; /* of the last channel that was looked up */
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-            const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
-            const __m256 t1 = pick(terms[1], piece), t2 = pick(terms[2], piece), t3 = pick(terms[3], piece);
-            const __m256 half_bend = _mm256_fmadd_ps(t_by_3, t3, t2);
-            const __m256 bend = _mm256_fmadd_ps(t, _mm256_add_ps(half_bend, t2), t1);
-            __m256 value = _mm256_fmadd_ps(t, _mm256_fmadd_ps(t, _mm256_fmadd_ps(t, t3, t2), t1),
-                                           pick(terms[0], piece));
-            value = _mm256_fmadd_ps(first, bend, _mm256_fmadd_ps(second, half_bend, value));
+            if (c == 0 || !is_grey) {
+                const float(*const terms)[RENDER_GATHER_PIECES] = kernel->terms[c];
+                const __m256 t1 = pick(terms[1], piece), t2 = pick(terms[2], piece),
+                             t3 = pick(terms[3], piece);
+                const __m256 half_bend = _mm256_fmadd_ps(t_by_3, t3, t2);
+                const __m256 bend = _mm256_fmadd_ps(t, _mm256_add_ps(half_bend, t2), t1);
+                value = _mm256_fmadd_ps(t, _mm256_fmadd_ps(t, _mm256_fmadd_ps(t, t3, t2), t1),
+                                        pick(terms[0], piece));
+                value = _mm256_fmadd_ps(first, bend, _mm256_fmadd_ps(second, half_bend, value));
+                if (has_slopes)
+                    spread_bend =
+                        _mm256_fmadd_ps(first_by_4, half_bend, _mm256_fmadd_ps(second_by_3, t3, bend));
+            }
             const float kept = source->flux_w[c] * (1 + kernel->lost_per_mm2[c] * trace);
             const __m256 flux = _mm256_and_ps(_mm256_set1_ps(kept), is_near);
             sums[c] = _mm256_fmadd_ps(flux, value, sums[c]);
             if (has_slopes) {
-                const __m256 spread_bend =
-                    _mm256_fmadd_ps(first_by_4, half_bend, _mm256_fmadd_ps(second_by_3, t3, bend));
                 const __m256 change = _mm256_mul_ps(_mm256_mul_ps(flux, slope_by_2), spread_bend);
                 slopes[c][0] = _mm256_fmadd_ps(change, dx, slopes[c][0]);
                 slopes[c][1] = _mm256_fmadd_ps(change, dy, slopes[c][1]);
@@ -136,14 +141,20 @@ static void sum(const struct render_gather_kernel *kernel,
                 const struct render_gather_source *const *sources, size_t count,
                 struct render_gather_places *places)
 {
-    sum_all(kernel, sources, count, places, false);
+    if (kernel->is_grey)
+        sum_all(kernel, sources, count, places, false, true);
+    else
+        sum_all(kernel, sources, count, places, false, false);
 }
 
 static void sum_with_slopes(const struct render_gather_kernel *kernel,
                             const struct render_gather_source *const *sources, size_t count,
                             struct render_gather_places *places)
 {
-    sum_all(kernel, sources, count, places, true);
+    if (kernel->is_grey)
+        sum_all(kernel, sources, count, places, true, true);
+    else
+        sum_all(kernel, sources, count, places, true, false);
 }
 
 const struct render_gather_loops render_gather_loops_avx2 = { near, list, sum, sum_with_slopes };

@@ -149,6 +149,19 @@ static void keep_power(const struct render_split *split, int band, struct render
     }
 }
 
+static bool is_grey(const struct render_gather_kernel *kernel)
+{
+    bool is_grey = true;
+    for (int c = 1; c < IO_CHANNEL_COUNT; c++) {
+        is_grey = is_grey && kernel->lost_per_mm2[c] == kernel->lost_per_mm2[0];
+        for (int k = 0; k < RENDER_GATHER_TERMS; k++) {
+            for (int p = 0; p < RENDER_GATHER_PIECES; p++)
+                is_grey = is_grey && kernel->terms[c][k][p] == kernel->terms[0][k][p];
+        }
+    }
+    return is_grey;
+}
+
 void render_gather_kernel_init(const struct render_split *split, int band,
                                struct render_gather_kernel *kernel)
 {
@@ -177,6 +190,7 @@ void render_gather_kernel_init(const struct render_split *split, int band,
         }
     }
     keep_power(split, band, kernel);
+    kernel->is_grey = is_grey(kernel);
 }
 
 const struct render_gather_loops *render_gather_loops_best(void)

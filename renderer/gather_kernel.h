@@ -20,6 +20,7 @@ enum { RENDER_GATHER_LANES = 8, RENDER_GATHER_PIECES = 8, RENDER_GATHER_TERMS = 
 struct render_gather_kernel {
     float inverse_per_mm2, reach2_mm2;
     float lost_per_mm2[IO_CHANNEL_COUNT]; /* of the power, for each mm^2 of spread, and given back */
+    bool is_grey;                         /* the same in all channels: one need be looked up */
     _Alignas(32) float slope[RENDER_GATHER_PIECES]; /* of the mantissa, per mm^2 of the distance squared */
     _Alignas(32) float terms[IO_CHANNEL_COUNT][RENDER_GATHER_TERMS][RENDER_GATHER_PIECES];
 };

@@ -1,5 +1,7 @@
 #include "renderer/gather_sources.h"
 
+#include "lutgen/parallel.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -10,22 +12,45 @@ enum { ORDER_BITS = 3 };
 
 /* ---- order -------------------------------------------------------------------------------------- */
 
-static void fill_keys(const struct render_light_sample *samples, size_t count, double cell_mm,
-                      struct render_z_key *keys)
+/* Keys of so many samples are filled by one thread at a time. */
+enum { BLOCK_SIZE = 4096 };
+
+struct keys {
+    const struct render_light_sample *samples;
+    const uint64_t *codes; /* NULL: of cubes in space */
+    size_t count;
+    double min_mm[3], cell_mm;
+    struct render_z_key *keys;
+};
+
+static void fill_block(void *context, int block)
 {
-    double min_mm[3] = { INFINITY, INFINITY, INFINITY };
+    const struct keys *const all = context;
+    const size_t first = (size_t)block * BLOCK_SIZE;
+    for (size_t i = first; i < all->count && i < first + BLOCK_SIZE; i++) {
+        double cell[3];
+        for (int k = 0; k < 3 && !all->codes; k++)
+            cell[k] = ((double)all->samples[i].position_mm[k] - all->min_mm[k]) / all->cell_mm;
+        all->keys[i] =
+            (struct render_z_key){ .code = all->codes ? all->codes[i] : render_z_order(cell), .index = i };
+    }
+}
+
+static void fill_keys(const struct render_light_sample *samples, const uint64_t *codes, size_t count,
+                      double cell_mm, struct render_z_key *keys)
+{
+    struct keys all = {
+        .samples = samples, .codes = codes, .count = count, .cell_mm = cell_mm, .keys = keys
+    };
+    for (int k = 0; k < 3; k++)
+        all.min_mm[k] = INFINITY;
     for (size_t i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++) {
             const double place_mm = (double)samples[i].position_mm[k];
-            min_mm[k] = place_mm < min_mm[k] ? place_mm : min_mm[k];
+            all.min_mm[k] = place_mm < all.min_mm[k] ? place_mm : all.min_mm[k];
         }
     }
-    for (size_t i = 0; i < count; i++) {
-        double cell[3];
-        for (int k = 0; k < 3; k++)
-            cell[k] = ((double)samples[i].position_mm[k] - min_mm[k]) / cell_mm;
-        keys[i] = (struct render_z_key){ .code = render_z_order(cell), .index = i };
-    }
+    lut_parallel_for((int)((count + BLOCK_SIZE - 1) / BLOCK_SIZE), 0, fill_block, &all);
 }
 
 /* ---- merging ------------------------------------------------------------------------------------ */
@@ -88,6 +113,16 @@ static size_t merge(struct render_gather_source *sources, uint64_t *codes, size_
     return kept;
 }
 
+/* Samples in a row that are merged by one thread at a time; no cube is in two of them. */
+enum { PART_LIMIT = 16, PART_SIZE = 4096 };
+
+struct part {
+    size_t first, count;
+    struct render_gather_source *merged[RENDER_BAND_LIMIT];
+    size_t merged_count[RENDER_BAND_LIMIT];
+    bool is_done;
+};
+
 /* ---- groups and boxes --------------------------------------------------------------------------- */
 
 static void box_add(struct render_gather_box *box, const float min_mm[3], const float max_mm[3])
@@ -114,12 +149,33 @@ static void fill_group(const struct render_gather_source *sources, size_t count,
     }
 }
 
-static bool level_init(const struct render_gather_source *sources, size_t count,
+/* The parts' sources of a band, one part behind the other. */
+static void fill_groups(const struct part *parts, int part_count, int band,
+                        struct render_gather_level *level)
+{
+    struct render_gather_source lanes[RENDER_GATHER_LANES];
+    size_t group = 0, filled = 0;
+    for (int p = 0; p < part_count; p++) {
+        for (size_t i = 0; i < parts[p].merged_count[band]; i++) {
+            lanes[filled++] = parts[p].merged[band][i];
+            if (filled < RENDER_GATHER_LANES)
+                continue;
+            fill_group(lanes, filled, &level->groups[group], &level->boxes[0][group]);
+            group++;
+            filled = 0;
+        }
+    }
+    if (filled > 0)
+        fill_group(lanes, filled, &level->groups[group], &level->boxes[0][group]);
+}
+
+static bool level_init(const struct part *parts, int part_count, int band,
                        struct render_gather_level *level)
 {
-    level->source_count = count;
-    level->group_count = (count + RENDER_GATHER_LANES - 1) / RENDER_GATHER_LANES;
-    if (count == 0)
+    for (int p = 0; p < part_count; p++)
+        level->source_count += parts[p].merged_count[band];
+    level->group_count = (level->source_count + RENDER_GATHER_LANES - 1) / RENDER_GATHER_LANES;
+    if (level->source_count == 0)
         return true;
     size_t box_count = level->group_count, total = 0;
     while (level->depth < RENDER_GATHER_DEPTH) {
@@ -135,11 +191,7 @@ static bool level_init(const struct render_gather_source *sources, size_t count,
     level->boxes[0] = calloc(total + 1, sizeof *level->boxes[0]);
     if (!level->groups || !level->boxes[0])
         return false;
-    for (size_t g = 0; g < level->group_count; g++) {
-        const size_t first = g * RENDER_GATHER_LANES, left = count - first;
-        fill_group(sources + first, left < RENDER_GATHER_LANES ? left : RENDER_GATHER_LANES,
-                   &level->groups[g], &level->boxes[0][g]);
-    }
+    fill_groups(parts, part_count, band, level);
     for (int d = 1; d < level->depth; d++) {
         level->boxes[d] = level->boxes[d - 1] + level->box_counts[d - 1];
         for (size_t i = 0; i < level->box_counts[d - 1]; i++) {
@@ -157,36 +209,90 @@ static bool level_init(const struct render_gather_source *sources, size_t count,
 
 /* What the bands are made in: sources in order, and their codes. */
 struct workshop {
+    const struct render_light_sample *samples;
+    const struct render_z_key *order;
     struct render_gather_source *sources;
     uint64_t *codes;
     struct render_z_key *keys, *spare;
+    int order_bits;
+    struct part parts[PART_LIMIT];
+    int part_count;
+    struct render_gather_sources *out;
+    bool is_level_done[RENDER_BAND_LIMIT];
 };
 
-static bool fill_levels(const struct render_light_sample *samples, const uint64_t *codes, int code_level,
-                        size_t count, const struct render_band *bands, int band_count,
-                        struct workshop *shop, struct render_gather_sources *sources)
+/* By how many bits codes are shifted to be the same within a cube of the band. */
+static int shift_of(const struct workshop *shop, int band)
 {
-    const double finest_mm = bands[0].spacing_mm;
-    const int order_bits = codes ? code_level + 1 : ORDER_BITS;
-    if (!codes)
-        fill_keys(samples, count, ldexp(finest_mm, 1 - order_bits), shop->keys);
-    for (size_t i = 0; codes && i < count; i++)
-        shop->keys[i] = (struct render_z_key){ .code = codes[i], .index = i };
-    const struct render_z_key *const keys = render_light_samples_sort_keys(shop->keys, shop->spare, count);
+    const int shift = shop->order_bits + band - 1;
+    return 3 * (shift < 0 ? 0 : shift < 20 ? shift : 20);
+}
+
+/* Parts about as large as each other that end where a cube of the last band does. */
+static void share_out(struct workshop *shop, size_t count)
+{
+    const int shift = shift_of(shop, shop->out->band_count - 1);
+    const size_t wanted = count / PART_SIZE < PART_LIMIT ? count / PART_SIZE + 1 : PART_LIMIT;
+    size_t first = 0;
+    for (size_t i = 1; i <= wanted; i++) {
+        size_t end = i == wanted ? count : count / wanted * i;
+        while (end > first && end < count &&
+               shop->order[end].code >> shift == shop->order[end - 1].code >> shift)
+            end++;
+        if (end > first)
+            shop->parts[shop->part_count++] = (struct part){ .first = first, .count = end - first };
+        first = end > first ? end : first;
+    }
+}
+
+static void merge_part(void *context, int index)
+{
+    struct workshop *const shop = context;
+    struct part *const part = &shop->parts[index];
+    struct render_gather_source *const sources = shop->sources + part->first;
+    uint64_t *const codes = shop->codes + part->first;
+    size_t count = part->count;
     for (size_t i = 0; i < count; i++) {
-        const struct render_light_sample *const sample = &samples[keys[i].index];
-        shop->codes[i] = keys[i].code;
-        shop->sources[i] = (struct render_gather_source){ .spread_mm2 = { 0 } };
-        memcpy(shop->sources[i].position_mm, sample->position_mm, sizeof sample->position_mm);
-        memcpy(shop->sources[i].flux_w, sample->flux_w, sizeof sample->flux_w);
+        const struct render_z_key *const key = &shop->order[part->first + i];
+        const struct render_light_sample *const sample = &shop->samples[key->index];
+        codes[i] = key->code;
+        sources[i] = (struct render_gather_source){ .spread_mm2 = { 0 } };
+        memcpy(sources[i].position_mm, sample->position_mm, sizeof sample->position_mm);
+        memcpy(sources[i].flux_w, sample->flux_w, sizeof sample->flux_w);
     }
-    for (int b = 0; b < band_count; b++) {
-        const int shift = order_bits + b - 1;
-        count = merge(shop->sources, shop->codes, count, 3 * (shift < 0 ? 0 : shift < 20 ? shift : 20));
-        if (!level_init(shop->sources, count, &sources->levels[b]))
-            return false;
+    for (int b = 0; b < shop->out->band_count; b++) {
+        count = merge(sources, codes, count, shift_of(shop, b));
+        part->merged[b] = malloc((count + 1) * sizeof *sources);
+        if (!part->merged[b])
+            return;
+        memcpy(part->merged[b], sources, count * sizeof *sources);
+        part->merged_count[b] = count;
     }
-    return true;
+    part->is_done = true;
+}
+
+static void make_level(void *context, int band)
+{
+    struct workshop *const shop = context;
+    shop->is_level_done[band] = level_init(shop->parts, shop->part_count, band, &shop->out->levels[band]);
+}
+
+static bool fill_levels(struct workshop *shop, const uint64_t *codes, int code_level, size_t count,
+                        double finest_mm)
+{
+    shop->order_bits = codes ? code_level + 1 : ORDER_BITS;
+    fill_keys(shop->samples, codes, count, ldexp(finest_mm, 1 - shop->order_bits), shop->keys);
+    shop->order = render_light_samples_sort_keys(shop->keys, shop->spare, count);
+    share_out(shop, count);
+    lut_parallel_for(shop->part_count, 0, merge_part, shop);
+    bool done = true;
+    for (int i = 0; i < shop->part_count; i++)
+        done &= shop->parts[i].is_done;
+    if (done)
+        lut_parallel_for(shop->out->band_count, 0, make_level, shop);
+    for (int b = 0; done && b < shop->out->band_count; b++)
+        done = shop->is_level_done[b];
+    return done;
 }
 
 bool render_gather_sources_init(const struct render_light_sample *samples, const uint64_t *codes,
@@ -197,12 +303,18 @@ bool render_gather_sources_init(const struct render_light_sample *samples, const
     *sources = (struct render_gather_sources){ .band_count = band_count };
     if (count == 0)
         return true;
-    struct workshop shop = { .sources = calloc(count, sizeof *shop.sources),
-                             .codes = calloc(count, sizeof *shop.codes),
-                             .keys = calloc(count, sizeof *shop.keys),
-                             .spare = calloc(count, sizeof *shop.spare) };
+    struct workshop shop = { .samples = samples,
+                             .sources = malloc(count * sizeof *shop.sources),
+                             .codes = malloc(count * sizeof *shop.codes),
+                             .keys = malloc(count * sizeof *shop.keys),
+                             .spare = malloc(count * sizeof *shop.spare),
+                             .out = sources };
     const bool done = shop.sources && shop.codes && shop.keys && shop.spare &&
-                      fill_levels(samples, codes, code_level, count, bands, band_count, &shop, sources);
+                      fill_levels(&shop, codes, code_level, count, bands[0].spacing_mm);
+    for (int i = 0; i < shop.part_count; i++) {
+        for (int b = 0; b < band_count; b++)
+            free(shop.parts[i].merged[b]);
+    }
     free(shop.sources);
     free(shop.codes);
     free(shop.keys);

@@ -11,7 +11,7 @@
 /* Extents are measured on float positions: a patch exactly as wide as the spacing must not be split. */
 #define EXTENT_SLACK 1e-4
 
-enum { FIRST_CAPACITY = 4096 };
+enum { FIRST_CAPACITY = 4096, TILE_WANTED = 48 };
 
 /* A block of texels. */
 struct block {
@@ -21,8 +21,10 @@ struct block {
 struct reducer {
     const struct render_light_target *targets;
     const struct render_light_view *view;
-    int object; /* that is being sampled */
-    double limit_mm;
+    int object;                 /* that is being sampled */
+    double limit_mm, widest_mm; /* of the object; of any */
+    int left, low, right, high; /* texels that there are, right and high are one past the last */
+    float *tile;                /* of texels, then of objects, where the view draws tiles */
     dipole_status *status;
 };
 
@@ -37,88 +39,133 @@ static const float *lit_texel(const struct reducer *reducer, int x, int y)
     return texel[3] > 0 && is_its ? texel : NULL;
 }
 
-/*
- * Extent on the surface of one line of texels, from (x, y) in steps of (dx, dy): across the view from end
- * to end, and in depth from nearest to farthest. Positions are those of texel centres, so the extent is
- * scaled from the distance of centres to whole texels.
- */
-static double line_extent_mm(const struct reducer *reducer, int x, int y, int dx, int dy, int count)
+/* What is lit of a line of texels. */
+struct line {
+    const float *first, *last; /* NULL: nothing */
+    int first_index, last_index;
+    double depth_min, depth_max;
+};
+
+static const struct line dark_line = { .depth_min = INFINITY, .depth_max = -INFINITY };
+
+static void line_add(struct line *line, const float *texel, int index, double depth)
 {
-    const struct render_light_view *const view = reducer->view;
-    const float *first = NULL, *last = NULL;
-    int first_index = 0, last_index = 0;
-    double depth_min = INFINITY, depth_max = -INFINITY;
-    for (int i = 0; i < count; i++) {
-        const float *const t = lit_texel(reducer, x + i * dx, y + i * dy);
-        if (!t)
-            continue;
-        const double depth = view->forward[0] * (double)t[0] + view->forward[1] * (double)t[1] +
-                             view->forward[2] * (double)t[2];
-        depth_min = depth < depth_min ? depth : depth_min; /* as fmin(), but several times faster */
-        depth_max = depth > depth_max ? depth : depth_max;
-        if (!first) {
-            first = t;
-            first_index = i;
-        }
-        last = t;
-        last_index = i;
+    line->depth_min = depth < line->depth_min ? depth : line->depth_min; /* as fmin(), but faster */
+    line->depth_max = depth > line->depth_max ? depth : line->depth_max;
+    if (!line->first) {
+        line->first = texel;
+        line->first_index = index;
     }
-    if (!first || first_index == last_index)
-        return 0;
-    double step[3], along = 0;
-    for (int k = 0; k < 3; k++) {
-        step[k] = (double)last[k] - (double)first[k];
-        along += step[k] * view->forward[k];
-    }
-    double across2 = 0;
-    for (int k = 0; k < 3; k++)
-        across2 += (step[k] - along * view->forward[k]) * (step[k] - along * view->forward[k]);
-    const double depth_range = depth_max - depth_min;
-    const int steps = last_index - first_index;
-    return sqrt(across2 + depth_range * depth_range) * (steps + 1) / steps;
+    line->last = texel;
+    line->last_index = index;
 }
 
-/* Largest extent of a block's lines along x (or y). A block one texel wide is measured together with its
- * neighbour, of which it is half. */
-static double block_extent_mm(const struct reducer *reducer, struct block block, bool is_along_x)
+/*
+ * Square of a line's extent on the surface: across the view from end to end, and in depth from nearest to
+ * farthest. Positions are those of texel centres, so the extent is scaled from the distance of centres to
+ * whole texels.
+ */
+static double line_extent2_mm2(const double forward[3], const struct line *line)
 {
-    const int size_px = reducer->view->size_px;
-    const int length = is_along_x ? block.width : block.height;
-    if (length == 1) {
-        if (is_along_x) {
-            block.x &= ~1;
-            block.width = block.x + 2 <= size_px ? 2 : 1;
-        } else {
-            block.y &= ~1;
-            block.height = block.y + 2 <= size_px ? 2 : 1;
+    if (!line->first || line->first_index == line->last_index)
+        return 0;
+    double across2 = 0, along = 0;
+    for (int k = 0; k < 3; k++) {
+        const double step = (double)line->last[k] - (double)line->first[k];
+        across2 += step * step;
+        along += step * forward[k];
+    }
+    const double depth_range = line->depth_max - line->depth_min;
+    const int steps = line->last_index - line->first_index;
+    const double scale = (double)(steps + 1) / steps;
+    const double flat2 = across2 - along * along; /* what is left may be a rounding error below 0 */
+    return ((flat2 > 0 ? flat2 : 0) + depth_range * depth_range) * scale * scale;
+}
+
+struct extents {
+    double x_mm, y_mm;
+};
+
+/* The largest extents of a block's rows and of its columns. */
+static struct extents extents_of_lines(const struct reducer *reducer, struct block block)
+{
+    const double *const forward = reducer->view->forward;
+    struct line columns[RENDER_LIGHT_BLOCK_LIMIT];
+    double x2_mm2 = 0, y2_mm2 = 0;
+    assert(block.width <= RENDER_LIGHT_BLOCK_LIMIT);
+    for (int i = 0; i < block.width; i++)
+        columns[i] = dark_line;
+    for (int j = 0; j < block.height; j++) {
+        struct line row = dark_line;
+        for (int i = 0; i < block.width; i++) {
+            const float *const t = lit_texel(reducer, block.x + i, block.y + j);
+            if (!t)
+                continue;
+            const double depth =
+                forward[0] * (double)t[0] + forward[1] * (double)t[1] + forward[2] * (double)t[2];
+            line_add(&row, t, i, depth);
+            line_add(&columns[i], t, j, depth);
         }
+        const double extent2_mm2 = line_extent2_mm2(forward, &row);
+        x2_mm2 = extent2_mm2 > x2_mm2 ? extent2_mm2 : x2_mm2;
     }
-    double largest = 0;
-    const int lines = is_along_x ? block.height : block.width;
-    for (int i = 0; i < lines; i++) {
-        const double extent = is_along_x
-                                  ? line_extent_mm(reducer, block.x, block.y + i, 1, 0, block.width)
-                                  : line_extent_mm(reducer, block.x + i, block.y, 0, 1, block.height);
-        largest = fmax(largest, extent);
+    for (int i = 0; i < block.width; i++) {
+        const double extent2_mm2 = line_extent2_mm2(forward, &columns[i]);
+        y2_mm2 = extent2_mm2 > y2_mm2 ? extent2_mm2 : y2_mm2;
     }
-    return length == 1 ? 0.5 * largest : largest;
+    return (struct extents){ .x_mm = sqrt(x2_mm2), .y_mm = sqrt(y2_mm2) };
+}
+
+/* Of a block's lines; one that is one texel wide is measured together with its neighbour, of which it is
+ * half. */
+static struct extents block_extents(const struct reducer *reducer, struct block block)
+{
+    struct extents extents = extents_of_lines(reducer, block);
+    struct block wide = block, high = block;
+    if (block.width == 1) {
+        wide.x &= ~1;
+        wide.width = wide.x + 2 <= reducer->right ? 2 : 1;
+        extents.x_mm = 0.5 * extents_of_lines(reducer, wide).x_mm;
+    }
+    if (block.height == 1) {
+        high.y &= ~1;
+        high.height = high.y + 2 <= reducer->high ? 2 : 1;
+        extents.y_mm = 0.5 * extents_of_lines(reducer, high).y_mm;
+    }
+    return extents;
+}
+
+static bool grow_samples(struct render_light_samples *samples, size_t capacity, dipole_status *status)
+{
+    struct render_light_sample *const grown =
+        capacity > SIZE_MAX / sizeof *grown ? NULL : realloc(samples->samples, capacity * sizeof *grown);
+    if (!grown)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples", capacity);
+    samples->samples = grown;
+    samples->capacity = capacity;
+    return true;
 }
 
 bool render_light_samples_add(struct render_light_samples *samples,
                               const struct render_light_sample *sample, dipole_status *status)
 {
-    if (samples->count == samples->capacity) {
-        const size_t capacity = samples->capacity ? 2 * samples->capacity : FIRST_CAPACITY;
-        struct render_light_sample *const grown = capacity > SIZE_MAX / sizeof *grown
-                                                      ? NULL
-                                                      : realloc(samples->samples, capacity * sizeof *grown);
-        if (!grown)
-            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
-                               capacity);
-        samples->samples = grown;
-        samples->capacity = capacity;
-    }
+    if (samples->count == samples->capacity &&
+        !grow_samples(samples, samples->capacity ? 2 * samples->capacity : FIRST_CAPACITY, status))
+        return false;
     samples->samples[samples->count++] = *sample;
+    return true;
+}
+
+bool render_light_samples_add_all(struct render_light_samples *samples,
+                                  const struct render_light_samples *others, dipole_status *status)
+{
+    if (others->count == 0)
+        return true;
+    if (samples->capacity - samples->count < others->count &&
+        !grow_samples(samples, samples->count + others->count, status))
+        return false;
+    memcpy(samples->samples + samples->count, others->samples, others->count * sizeof *others->samples);
+    samples->count += others->count;
     return true;
 }
 
@@ -159,14 +206,13 @@ static bool append_block(const struct reducer *reducer, struct block block, doub
 /* Halve the block across its longer side on the surface until both are short enough. */
 static bool reduce_block(const struct reducer *reducer, struct block block)
 {
-    const double extent_x_mm = block_extent_mm(reducer, block, true);
-    const double extent_y_mm = block_extent_mm(reducer, block, false);
-    const bool can_split_x = block.width > 1 && extent_x_mm > reducer->limit_mm;
-    const bool can_split_y = block.height > 1 && extent_y_mm > reducer->limit_mm;
+    const struct extents extents = block_extents(reducer, block);
+    const bool can_split_x = block.width > 1 && extents.x_mm > reducer->limit_mm;
+    const bool can_split_y = block.height > 1 && extents.y_mm > reducer->limit_mm;
     if (!can_split_x && !can_split_y)
-        return append_block(reducer, block, fmax(extent_x_mm, extent_y_mm));
+        return append_block(reducer, block, fmax(extents.x_mm, extents.y_mm));
     struct block low = block, high = block;
-    if (can_split_x && (extent_x_mm >= extent_y_mm || !can_split_y)) {
+    if (can_split_x && (extents.x_mm >= extents.y_mm || !can_split_y)) {
         low.width /= 2;
         high.x += low.width;
         high.width -= low.width;
@@ -204,6 +250,28 @@ static bool is_lit(const struct render_light_view *view, struct block block)
     return false;
 }
 
+/* Whether a block of a perspective view is wider, across the view where its first lit texel is, than any
+ * object's samples may be apart: then it need not be measured to be split. */
+static bool is_too_wide(const struct reducer *reducer, struct block block)
+{
+    const struct render_light_view *const view = reducer->view;
+    if (!(view->texel > 0) || block.width % 2 != 0 || block.height % 2 != 0)
+        return false;
+    for (int y = block.y; y < block.y + block.height; y++) {
+        const float *const row = view->texels + 4 * ((size_t)y * (size_t)view->size_px + (size_t)block.x);
+        for (int i = 0; i < block.width; i++) {
+            const float *const t = row + 4 * (size_t)i;
+            if (!(t[3] > 0))
+                continue;
+            const double depth_mm = view->forward[0] * (double)t[0] + view->forward[1] * (double)t[1] +
+                                    view->forward[2] * (double)t[2] - view->eye_depth_mm;
+            return (block.width < block.height ? block.width : block.height) * view->texel * depth_mm >
+                   reducer->widest_mm;
+        }
+    }
+    return false;
+}
+
 /* The block's samples, object by object. */
 static bool reduce_objects(struct reducer *reducer, struct block block)
 {
@@ -220,22 +288,42 @@ static bool reduce_objects(struct reducer *reducer, struct block block)
     return true;
 }
 
+static bool reduce_quadrant(struct reducer *reducer, int x, int y, int size);
+
+/* One tile is a small view of its own. */
+static bool reduce_tile(const struct reducer *reducer, int x, int y)
+{
+    struct render_light_view drawn = *reducer->view;
+    const size_t texel_count = (size_t)drawn.tile_px * (size_t)drawn.tile_px;
+    float *const objects = drawn.tile_object_count > 0 ? reducer->tile + 4 * texel_count : NULL;
+    if (!drawn.draw_tile(drawn.tiles, x, y, reducer->tile, objects))
+        return true;
+    struct reducer of_tile = *reducer;
+    drawn.draw_tile = NULL;
+    drawn.texels = reducer->tile;
+    drawn.objects = objects;
+    drawn.size_px = drawn.tile_px;
+    of_tile.view = &drawn;
+    of_tile.left = x < 0 ? -x : 0;
+    of_tile.low = y < 0 ? -y : 0;
+    of_tile.right = reducer->right - x < drawn.tile_px ? reducer->right - x : drawn.tile_px;
+    of_tile.high = reducer->high - y < drawn.tile_px ? reducer->high - y : drawn.tile_px;
+    return reduce_quadrant(&of_tile, 0, 0, drawn.tile_px);
+}
+
 /* Walk down the quadtree over the whole view: samples near in space then lie near in the list. */
 static bool reduce_quadrant(struct reducer *reducer, int x, int y, int size)
 {
-    const int size_px = reducer->view->size_px;
-    if (x >= size_px || y >= size_px)
+    const int left = x > reducer->left ? x : reducer->left, low = y > reducer->low ? y : reducer->low;
+    const int right = x + size < reducer->right ? x + size : reducer->right,
+              high = y + size < reducer->high ? y + size : reducer->high;
+    if (left >= right || low >= high)
         return true;
-    if (x + size <= 0 || y + size <= 0)
-        return true;
-    if (size <= 1 << reducer->view->levels) {
-        const int left = x > 0 ? x : 0, bottom = y > 0 ? y : 0;
-        const int right = x + size < size_px ? x + size : size_px;
-        const int top = y + size < size_px ? y + size : size_px;
-        return reduce_objects(
-            reducer,
-            (struct block){ .x = left, .y = bottom, .width = right - left, .height = top - bottom });
-    }
+    if (reducer->view->draw_tile && size <= reducer->view->tile_px)
+        return reduce_tile(reducer, x, y);
+    const struct block block = { .x = left, .y = low, .width = right - left, .height = high - low };
+    if (size <= reducer->view->block_px && !(size % 2 == 0 && is_too_wide(reducer, block)))
+        return reduce_objects(reducer, block);
     const int half = size / 2;
     return reduce_quadrant(reducer, x, y, half) && reduce_quadrant(reducer, x + half, y, half) &&
            reduce_quadrant(reducer, x, y + half, half) &&
@@ -257,7 +345,8 @@ struct part {
 
 struct parts {
     const struct render_light_view *view;
-    int start, size; /* of the whole quadtree, along both sides */
+    int start, size;  /* of the whole quadtree, along both sides */
+    double widest_mm; /* samples of any object may be so far apart */
     struct part at[PART_COUNT];
 };
 
@@ -275,27 +364,33 @@ static void reduce_part(void *context, int index)
     struct parts *const parts = context;
     struct part *const part = &parts->at[index];
     struct reducer reducer = { .targets = part->targets, .view = parts->view, .status = &part->status };
-    const int size = parts->size >> PART_LEVELS;
+    reducer.right = reducer.high = parts->view->size_px;
+    reducer.widest_mm = parts->widest_mm;
+    const int size = parts->size >> PART_LEVELS, tile_px = parts->view->tile_px;
+    if (parts->view->draw_tile) {
+        reducer.tile = malloc((size_t)tile_px * (size_t)tile_px * 5 * sizeof *reducer.tile);
+        if (!reducer.tile) {
+            part->is_done = dipole_fail(&part->status, DIPOLE_OUT_OF_MEMORY, NULL,
+                                        "no memory for a tile of %d texels a side", tile_px);
+            return;
+        }
+    }
     part->is_done = reduce_quadrant(&reducer, parts->start + every_other_bit(index) * size,
                                     parts->start + every_other_bit(index >> 1) * size, size);
+    free(reducer.tile);
 }
 
-static bool append_all(struct render_light_samples *samples, const struct render_light_samples *more,
-                       dipole_status *status)
+/* Room for so many more. */
+static bool reserve(struct render_light_samples *samples, size_t more, dipole_status *status)
 {
-    if (more->count == 0)
+    if (samples->capacity - samples->count >= more)
         return true;
-    if (samples->capacity - samples->count < more->count) {
-        const size_t capacity = samples->count + more->count + samples->capacity / 2;
-        struct render_light_sample *const grown = realloc(samples->samples, capacity * sizeof *grown);
-        if (!grown)
-            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
-                               capacity);
-        samples->samples = grown;
-        samples->capacity = capacity;
-    }
-    memcpy(samples->samples + samples->count, more->samples, more->count * sizeof *more->samples);
-    samples->count += more->count;
+    const size_t capacity = samples->count + more;
+    struct render_light_sample *const grown = realloc(samples->samples, capacity * sizeof *grown);
+    if (!grown)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples", capacity);
+    samples->samples = grown;
+    samples->capacity = capacity;
     return true;
 }
 
@@ -319,6 +414,8 @@ static size_t number_lists(const struct render_light_target *targets, size_t tar
 static size_t count_targets(const struct render_light_view *view)
 {
     float most = 1;
+    if (view->draw_tile)
+        return view->tile_object_count > 0 ? view->tile_object_count : 1;
     const size_t texel_count = (size_t)view->size_px * (size_t)view->size_px;
     for (size_t i = 0; view->objects && i < texel_count; i++)
         most = fmaxf(most, view->texels[4 * i + 3] > 0 ? view->objects[i] : 0);
@@ -349,27 +446,50 @@ static bool parts_init(struct parts *parts, const struct render_light_target *ta
 static bool parts_join(const struct parts *parts, struct render_light_samples *const *lists,
                        size_t list_count, dipole_status *status)
 {
-    bool done = true;
-    for (size_t p = 0; done && p < PART_COUNT; p++) {
-        const struct part *const part = &parts->at[p];
-        if (!part->is_done && status)
-            *status = part->status;
-        done = part->is_done;
-        for (size_t k = 0; done && k < list_count; k++)
-            done = !lists[k] || append_all(lists[k], &part->lists[k], status);
+    for (size_t p = 0; p < PART_COUNT; p++) {
+        if (parts->at[p].is_done)
+            continue;
+        if (status)
+            *status = parts->at[p].status;
+        return false;
     }
-    return done;
+    for (size_t k = 0; k < list_count; k++) {
+        size_t more = 0;
+        for (size_t p = 0; p < PART_COUNT; p++)
+            more += parts->at[p].lists[k].count;
+        if (lists[k] && !reserve(lists[k], more, status))
+            return false;
+        for (size_t p = 0; lists[k] && p < PART_COUNT; p++) {
+            const struct render_light_samples *const part = &parts->at[p].lists[k];
+            if (part->count > 0)
+                memcpy(lists[k]->samples + lists[k]->count, part->samples,
+                       part->count * sizeof *part->samples);
+            lists[k]->count += part->count;
+        }
+    }
+    return true;
+}
+
+int render_light_tile_px(int block_px)
+{
+    int tile_px = block_px;
+    while (tile_px < TILE_WANTED)
+        tile_px *= 2;
+    return tile_px;
 }
 
 bool render_light_samples_append(const struct render_light_target *targets,
                                  const struct render_light_view *view, dipole_status *status)
 {
     const size_t target_count = count_targets(view);
-    const int shift = view->is_shifted ? 1 << view->levels >> 1 : 0;
-    struct parts parts = { .view = view, .start = -shift, .size = 1 };
+    const int shift = render_light_view_shift_px(view),
+              least_px = view->draw_tile ? view->tile_px : view->block_px;
+    struct parts parts = { .view = view, .start = -shift, .size = least_px << PART_LEVELS };
     size_t *const numbers = calloc(target_count, sizeof *numbers);
     struct render_light_samples **const lists = calloc(target_count, sizeof(struct render_light_samples *));
-    while (parts.size < view->size_px + shift || parts.size < 1 << (view->levels + PART_LEVELS))
+    for (size_t i = 0; i < target_count; i++)
+        parts.widest_mm = fmax(parts.widest_mm, targets[i].spacing_mm);
+    while (parts.size < view->size_px + shift)
         parts.size *= 2;
     size_t list_count = 0;
     if (numbers && lists)
@@ -415,15 +535,12 @@ static size_t digit_of(const struct render_z_key *key, int shift)
     return (size_t)((shift < 64 ? key->code : (uint64_t)key->object) >> shift % 64) & (DIGIT_COUNT - 1);
 }
 
-/* Sort by one digit; false: there is nothing to do. */
-static bool sort_digit(const struct render_z_key *keys, size_t count, int shift,
+static void sort_digit(const struct render_z_key *keys, size_t count, int shift,
                        struct render_z_key *sorted)
 {
     size_t starts[DIGIT_COUNT] = { 0 };
     for (size_t i = 0; i < count; i++)
         starts[digit_of(&keys[i], shift)]++;
-    if (starts[digit_of(&keys[0], shift)] == count)
-        return false;
     size_t sum = 0;
     for (size_t d = 0; d < DIGIT_COUNT; d++) {
         const size_t here = starts[d];
@@ -432,16 +549,21 @@ static bool sort_digit(const struct render_z_key *keys, size_t count, int shift,
     }
     for (size_t i = 0; i < count; i++)
         sorted[starts[digit_of(&keys[i], shift)]++] = keys[i];
-    return true;
 }
 
 struct render_z_key *render_light_samples_sort_keys(struct render_z_key *keys, struct render_z_key *spare,
                                                     size_t count)
 {
     static const int shifts[] = { 0, 11, 22, 33, 44, 55, 64, 75, 86 };
+    uint64_t differing[2] = { 0, 0 }; /* bits of codes, and of objects */
+    for (size_t i = 1; i < count; i++) {
+        differing[0] |= keys[i].code ^ keys[0].code;
+        differing[1] |= (uint64_t)keys[i].object ^ (uint64_t)keys[0].object;
+    }
     for (size_t s = 0; s < sizeof shifts / sizeof *shifts; s++) {
-        if (!sort_digit(keys, count, shifts[s], spare))
+        if ((differing[shifts[s] / 64] >> shifts[s] % 64 & (DIGIT_COUNT - 1)) == 0)
             continue;
+        sort_digit(keys, count, shifts[s], spare);
         struct render_z_key *const sorted = spare;
         spare = keys;
         keys = sorted;

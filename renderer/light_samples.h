@@ -25,6 +25,8 @@ struct render_light_samples {
     size_t code_capacity;
 };
 
+enum { RENDER_LIGHT_BLOCK_LIMIT = 128 };
+
 /* One picture from a light: size_px x size_px texels of { x, y, z in mm, power share }, where
  * power share times the light's rgb is the transmitted power in W of the texel; 0 where no surface is. */
 struct render_light_view {
@@ -34,14 +36,32 @@ struct render_light_view {
         *irradiance; /* of each texel, per rgb; NULL, or in place of its flux samples get their mean */
     int size_px;
     double forward[3]; /* unit vector, the view's depth axis */
+    double eye_depth_mm,
+        texel; /* perspective: the eye's place along forward; a texel's width at distance 1 */
     double rgb[3];
-    int levels;           /* texels are merged in blocks of 2^levels at most         */
+    int block_px; /* texels are merged in square blocks of so many a side, 1 to RENDER_LIGHT_BLOCK_LIMIT */
     const float *rest_mm; /* of each texel, of four floats: its surface at rest; for cell_samples.h      */
     const float *shadows; /* of blocks, four floats: part of each channel's power that arrives; NULL: all */
     int shadow_block_px, shadow_side_px; /* texels a side of a block, and blocks a side              */
     double flux_factor; /* 0: 1. Samples carry so much of the flux                               */
     bool is_shifted;    /* blocks begin half of one before the view does                              */
+    /* In place of texels and objects: draws those of the tile whose lower left texel is (x, y), or says
+     * that it is empty; as render_light_tiles_draw. Tiles begin where blocks do; each is a power of two
+     * blocks wide. Nothing else of a texel is known then. */
+    bool (*draw_tile)(const void *tiles, int x, int y, float *texels, float *objects);
+    const void *tiles;
+    int tile_px;
+    size_t tile_object_count; /* 0: objects are not told apart */
 };
+
+/* How many texels before the view its first blocks begin. */
+static inline int render_light_view_shift_px(const struct render_light_view *view)
+{
+    return view->is_shifted ? view->block_px / 2 : 0;
+}
+
+/* Texels a side of tiles that are drawn and sampled while they are in a processor's cache. */
+int render_light_tile_px(int block_px);
 
 /* Add what arrives of a texel's power share to that of each channel; nothing where the view has no shadows.
  */
@@ -66,7 +86,7 @@ struct render_light_target {
 
 /*
  * Append the samples of one view to the target of each object, of which there are as many as objects (or
- * one): each block of 2^levels texels a side is halved, across the side that is
+ * one): each block of block_px texels a side is halved, across the side that is
  * longer on the surface, until both extents on the surface (size across the view and depth range) are at
  * most spacing_mm, or one texel is left. Objects in one block are sampled one after the other. Neighbours
  * in the list are near each other in space. Fails with DIPOLE_OUT_OF_MEMORY.
@@ -91,6 +111,11 @@ struct render_light_sample render_light_samples_merge_run(const struct render_li
 DIPOLE_CHECKED bool render_light_samples_add(struct render_light_samples *samples,
                                              const struct render_light_sample *sample,
                                              dipole_status *status);
+
+/* Append all of others, without codes. Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_light_samples_add_all(struct render_light_samples *samples,
+                                                 const struct render_light_samples *others,
+                                                 dipole_status *status);
 
 /* By object, then code; equal ones stay in their order. Both hold count keys; returns the one that is
  * sorted. */

@@ -18,7 +18,7 @@ struct options {
     struct cli_common common;
     struct cli_texts allowed_paths;
     const char *output_path, *table_folder, *camera_name;
-    double epsilon;
+    double epsilon, budget_ms;
     int technique, context, area, coherence, gather;
     int tsm_gather, tsm_response, tsm_part, tsm_samples, layer_pairs;
     int environment_samples;
@@ -85,10 +85,12 @@ static json_t *create_result(const struct render_report *report, const char *pat
                                                  "predicted_ms", create_number(effect->predicted_ms), "ms",
                                                  effect->time_ms, "error", create_number(effect->error)));
     }
-    return json_pack("{s:s, s:f, s:o, s:f, s:I, s:s?}", "technique",
-                     render_technique_names[report->technique], "epsilon", report->epsilon, "effects",
-                     effects, "total_ms", report->total_ms, "peak_rss_bytes", peak_rss_bytes(), "image",
-                     path);
+    return json_pack("{s:s, s:f, s:o*, s:o, s:o, s:o, s:f, s:I, s:s?}", "technique",
+                     render_technique_names[report->technique], "epsilon", report->epsilon, "budget_ms",
+                     report->budget_ms > 0 ? json_real(report->budget_ms) : NULL, "error_predicted",
+                     create_number(report->error_predicted), "predicted_ms",
+                     create_number(report->predicted_ms), "effects", effects, "total_ms", report->total_ms,
+                     "peak_rss_bytes", peak_rss_bytes(), "image", path);
 }
 
 /* Ends the result, which may be NULL. */
@@ -107,7 +109,10 @@ static bool print_json(json_t *result, dipole_status *status)
 
 static void print_plan(const struct render_report *report)
 {
-    printf("technique %s, epsilon %g\n", render_technique_names[report->technique], report->epsilon);
+    printf("technique %s, epsilon %.3g", render_technique_names[report->technique], report->epsilon);
+    if (report->budget_ms > 0)
+        printf(", chosen for %g ms", report->budget_ms);
+    printf("\n");
     if (report->r_max_mm > 0) {
         printf("error predicted %.3g = truncation %.3g + aliasing %.3g + blur %.3g + banding %.3g + table "
                "%.3g",
@@ -154,7 +159,7 @@ static void print_report(const struct options *options, const struct render_repo
         return;
     if (options->is_explained)
         print_plan(report);
-    printf("%s: %s, epsilon %g, %.0f ms\n", path, render_technique_names[report->technique],
+    printf("%s: %s, epsilon %.3g, %.0f ms\n", path, render_technique_names[report->technique],
            report->epsilon, report->total_ms);
 }
 
@@ -226,6 +231,10 @@ static bool draw_frames(struct job *job, dipole_status *status)
         number_path(job->options->output_path, frame, path, sizeof path);
         io_scene_set_frame(job->scene, frame);
         is_done = draw_picture(job, path, status);
+        if (is_done && job->drawing.budget_ms > 0) { /* all frames alike */
+            job->drawing.budget_ms = 0;
+            job->drawing.epsilon = job->report.epsilon;
+        }
         total_ms += job->report.total_ms;
         if (job->options->common.json && is_done)
             json_array_append_new(results, create_result(&job->report, path));
@@ -328,27 +337,30 @@ static bool run(const struct cli_tool *tool, const struct options *options, cons
                                               .camera_name = options->camera_name,
                                               .width_px = options->size_px[0],
                                               .height_px = options->size_px[1] };
-    struct job job = { .tool = tool,
-                       .options = options,
-                       .reading = &reading,
-                       .drawing = { .technique = (enum render_technique)options->technique,
-                                    .area = (enum render_area)options->area,
-                                    .coherence = (enum render_coherence)options->coherence,
-                                    .gather = (enum render_gather)options->gather,
-                                    .epsilon = options->epsilon,
-                                    .environment_samples =
-                                        (enum render_environment_samples)options->environment_samples,
-                                    .ambient_visibility = (int)options->ambient_visibility,
-                                    .light_place_count = (int)options->light_points,
-                                    .shadows = { .node_limit = node_counts[options->shadow_nodes],
-                                                 .tap_count = (int)options->shadow_taps,
-                                                 .side_px = (int)options->shadow_side },
-                                    .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
-                                             .response = (enum render_tsm_response)options->tsm_response,
-                                             .part = (enum render_tsm_part)options->tsm_part,
-                                             .sample_count = sample_counts[options->tsm_samples],
-                                             .layer_count = 2 * options->layer_pairs } },
-                       .frame_count = options->frames[1] - options->frames[0] + 1 };
+    struct job job = {
+        .tool = tool,
+        .options = options,
+        .reading = &reading,
+        .drawing = { .technique = (enum render_technique)options->technique,
+                     .area = (enum render_area)options->area,
+                     .coherence = (enum render_coherence)options->coherence,
+                     .gather = (enum render_gather)options->gather,
+                     .epsilon = options->epsilon,
+                     .budget_ms = options->budget_ms,
+                     .is_warm = options->is_viewed || options->frames[1] > options->frames[0],
+                     .environment_samples = (enum render_environment_samples)options->environment_samples,
+                     .ambient_visibility = (int)options->ambient_visibility,
+                     .light_place_count = (int)options->light_points,
+                     .shadows = { .node_limit = node_counts[options->shadow_nodes],
+                                  .tap_count = (int)options->shadow_taps,
+                                  .side_px = (int)options->shadow_side },
+                     .tsm = { .gather = (enum render_tsm_gather)options->tsm_gather,
+                              .response = (enum render_tsm_response)options->tsm_response,
+                              .part = (enum render_tsm_part)options->tsm_part,
+                              .sample_count = sample_counts[options->tsm_samples],
+                              .layer_count = 2 * options->layer_pairs } },
+        .frame_count = options->frames[1] - options->frames[0] + 1
+    };
     bool is_png = false, done = false;
     parse_grid(options->splat_grid, &job.drawing.splat_grid);
     if ((!options->output_path || render_output_check(options->output_path, &is_png, status)) &&
@@ -395,6 +407,9 @@ static bool check_usage(const struct options *options, dipole_status *status)
           "--coherence is of --technique gather and splat alone" },
         { options->gather != RENDER_GATHER_AUTO && !may_gather && !options->is_viewed,
           "--gather is of --technique gather alone" },
+        { options->budget_ms > 0 && options->epsilon > 0, "--budget-ms cannot be used with --epsilon" },
+        { options->budget_ms > 0 && !has_samples && !options->is_viewed,
+          "--budget-ms is of --technique gather and splat alone: no error is predicted of others" },
         { options->environment_samples && !has_samples && !options->is_viewed,
           "--environment-samples is of --technique gather and splat alone" },
         { options->ambient_visibility != floor(options->ambient_visibility),
@@ -423,7 +438,7 @@ static bool check_usage(const struct options *options, dipole_status *status)
 
 int main(int argc, char **argv)
 {
-    struct options options = { .epsilon = RENDER_EPSILON_DEFAULT, .context = -1, .frames = { -1, -1 } };
+    struct options options = { .context = -1, .frames = { -1, -1 } };
     const struct cli_option table[] = {
         { .name = "output",
           .letter = 'o',
@@ -564,6 +579,15 @@ int main(int argc, char **argv)
           .help = "Relative error allowed, 1e-5 to 0.5, default 0.01.",
           .min = RENDER_EPSILON_MIN,
           .max = RENDER_EPSILON_MAX },
+        { .name = "budget-ms",
+          .kind = CLI_NUMBER,
+          .target = &options.budget_ms,
+          .argument = "T",
+          .help =
+              "In place of --epsilon: the least error, down to 0.003, whose picture is predicted to take T "
+              "milliseconds or less; with --frames, each picture after the first.",
+          .min = RENDER_BUDGET_MS_MIN,
+          .max = RENDER_BUDGET_MS_MAX },
         { .name = "explain",
           .kind = CLI_FLAG,
           .target = &options.is_explained,

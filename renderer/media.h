@@ -5,6 +5,8 @@
 #include "io/scene_file.h"
 #include "lutgen/lut.h"
 
+#include <math.h>
+
 /* One medium, of any model, homogeneous or layered. Light enters and leaves by its uppermost layer. */
 struct render_medium {
     const struct io_material *material; /* of the first object that is made of it            */
@@ -13,6 +15,8 @@ struct render_medium {
     dipole_stack *stacks[IO_CHANNEL_COUNT];
     double diffuse_reflectance[IO_CHANNEL_COUNT]; /* 0 where the channel scatters nothing    */
     bool has_scattering;                          /* in some channel                         */
+    struct io_passage
+        *passage; /* NULL: no object of it is closed, thin or told to be translucent, and not alone */
 };
 
 /* End it with render_media_destroy; the scene must outlive it. Any number of threads may read
@@ -22,9 +26,19 @@ struct render_media {
     size_t count;
     size_t object_count;
     double *area_mm2;    /* of each object's surface                                      */
+    double *volume_mm3;  /* the same; 0: it is not closed, changes its mesh, or stands alone */
+    bool *is_convex;     /* the same, never hides light from itself; false where nobody asks         */
     size_t *of_object;   /* index into media, for each object of the scene */
     bool has_scattering; /* some medium has */
 };
+
+/* Whether a body is so much wider than thick that a slab's transmittance is its own: mean thickness against
+ * the side of a square as large as the mean silhouette: of a ball 0.38, of a cube 0.27, of a square slab a
+ * fifth as thick as wide 0.17. theory.md T70 */
+static inline bool render_body_is_thin(double volume_mm3, double area_mm2)
+{
+    return 2 * volume_mm3 / area_mm2 <= sqrt(area_mm2 / 4) / 6;
+}
 
 /* A medium's profile on disk or in memory: a row of a splat table. */
 struct render_table {
@@ -48,6 +62,9 @@ double render_medium_spacing_mm(const struct render_medium *medium, double epsil
 
 /* The shortest mean free path of any layer of a channel that scatters; INFINITY where none does. */
 double render_medium_shortest_path_mm(const struct render_medium *medium);
+
+/* Whether all channels scatter alike: one profile does for them. */
+bool render_medium_is_grey(const struct render_medium *medium);
 
 /* Names of all the materials, between commas; cut off at size. Returns names. */
 const char *render_media_list_names(const struct render_media *media, char *names, size_t size);

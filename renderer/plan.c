@@ -1,6 +1,7 @@
 #include "renderer/plan_internal.h"
 
 #include "renderer/cost.h"
+#include "renderer/effects.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -300,20 +301,65 @@ static void choose_technique(const struct render_request *request, struct render
                      !request->is_captured && plan->lit_count > 0;
 }
 
+/* ---- costs -------------------------------------------------------------------------------------- */
+
+static size_t program_count(const struct render_effect *effect)
+{
+    size_t count = 0;
+    for (size_t p = 0; p < effect->pass_count; p++)
+        count += effect->passes[p].draw != RENDER_DRAW_NOTHING;
+    return count;
+}
+
+/* What an effect takes on this machine, of what it takes on that of cost.h. */
+static double predict_ms(const struct render_request *request, const struct render_effect *effect,
+                         double cost_ms)
+{
+    const struct render_effect_calibration *const here =
+        render_calibration_find(request->calibration, effect->name);
+    const double start_ms =
+        here ? here->start_ms : effect->start_ms + RENDER_COST_PROGRAM_MS * (double)program_count(effect);
+    return (here ? here->scale : 1) * cost_ms + (request->is_warm ? 0 : start_ms);
+}
+
+/* The same of what no effect does. */
+static double predict_beside_ms(const struct render_request *request, const struct render_plan *plan)
+{
+    const struct render_effect_calibration *const here =
+        render_calibration_find(request->calibration, RENDER_BESIDE_EFFECTS);
+    const double cost_ms = render_cost_ms(RENDER_COST_BESIDE_PIXEL, render_cost_pixels(plan));
+    return (here ? here->scale : 1) * cost_ms + (request->is_warm ? 0
+                                                 : here           ? here->start_ms
+                                                                  : RENDER_COST_BESIDE_MS);
+}
+
 const char *const render_gather_names[] = { "auto", "c", "gl", NULL };
+
+/* Whether everything that scatters in the picture does so alike in all channels. */
+static bool is_grey(const struct render_plan *plan)
+{
+    bool is_grey = true;
+    for (size_t m = 0; m < plan->media->count; m++)
+        is_grey = is_grey && (!plan->of_medium[m].is_visible || !plan->media->media[m].has_scattering ||
+                              render_medium_is_grey(&plan->media->media[m]));
+    return is_grey;
+}
 
 /* Needs the bands. */
 static void choose_gather(const struct render_request *request, struct render_plan *plan)
 {
-    const double by_c_ms = render_cost_gather_ms(plan, RENDER_GATHER_C, request->has_gpu),
-                 by_gl_ms = render_cost_gather_ms(plan, RENDER_GATHER_GL, request->has_gpu);
+    const double c_ms = render_cost_gather_ms(plan, RENDER_GATHER_C, request->has_gpu),
+                 gl_ms = render_cost_gather_ms(plan, RENDER_GATHER_GL, request->has_gpu);
+    const double by_c_ms = predict_ms(request, &render_effect_gather, c_ms),
+                 by_gl_ms = predict_ms(request, &render_effect_gather_gl, gl_ms);
     plan->has_gpu = request->has_gpu;
     plan->gather = by_gl_ms < by_c_ms ? RENDER_GATHER_GL : RENDER_GATHER_C;
     if (plan->technique != RENDER_TECHNIQUE_GATHER)
         plan->gather = RENDER_GATHER_C;
     else if (request->gather != RENDER_GATHER_AUTO)
         plan->gather = request->gather;
-    snprintf(plan->gather_reason, sizeof plan->gather_reason, "%s: %.3g ms in C, %.3g by %sOpenGL",
+    snprintf(plan->gather_reason, sizeof plan->gather_reason, "%s%s: %.3g ms in C, %.3g by %sOpenGL",
+             plan->gather == RENDER_GATHER_C && is_grey(plan) ? "grey: one profile for all channels; " : "",
              request->gather == RENDER_GATHER_AUTO ? "predicted" : "asked for; predicted", by_c_ms,
              by_gl_ms, request->has_gpu ? "" : "software ");
 }
@@ -326,11 +372,12 @@ static void decide(const struct render_request *request, struct render_plan *pla
         struct render_decision *const decision = &plan->decisions[e];
         *decision = render_effects[e]->decide(request, plan);
         if (decision->is_active && render_effects[e]->cost_ms)
-            decision->cost_ms = render_effects[e]->cost_ms(plan);
+            decision->cost_ms = predict_ms(request, render_effects[e], render_effects[e]->cost_ms(plan));
         if (decision->is_active && render_effects[e]->error)
             decision->error = render_effects[e]->error(plan);
         plan->effect_count++;
     }
+    plan->beside_ms = predict_beside_ms(request, plan);
 }
 
 bool render_plan_create(const struct render_request *request, struct render_plan **plan_out,
@@ -359,6 +406,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_predict_map_error(request, plan);
         choose_gather(request, plan);
         decide(request, plan);
+        render_plan_note_budget(request, plan);
         done = render_plan_add_passes(plan, render_effects, status);
     }
     if (done)
@@ -378,6 +426,8 @@ void render_plan_destroy(struct render_plan *plan)
     free(plan->of_medium);
     free(plan->views);
     free(plan->shadows.of_view);
+    free(plan->shadows.of_map);
+    render_casters_end(&plan->shadows.casters);
     free(plan->maps);
     free(plan->passes);
     free(plan);

@@ -6,6 +6,8 @@
 #define RENDERER_PLAN_H
 
 #include "renderer/bands.h"
+#include "renderer/calibration.h"
+#include "renderer/casters.h"
 #include "renderer/environment.h"
 #include "renderer/projection.h"
 #include "renderer/render.h"
@@ -24,6 +26,10 @@ struct render_request {
     enum render_environment_samples environment_samples;
     int ambient_visibility;
     double epsilon;
+    double budget_ms; /* 0: none; else epsilon is the least whose plan is predicted to take no longer */
+    bool is_warm;     /* predict a picture after the first */
+    const struct render_calibration *calibration; /* NULL: costs are those of cost.h's machine */
+    struct render_limits limits;
     double spacing_mm; /* 0: from epsilon */
     enum render_technique technique;
     enum render_area area;
@@ -76,6 +82,7 @@ struct render_effect {
     const char *name, *source; /* source: publication, or what it is */
     struct render_decision (*decide)(const struct render_request *request, const struct render_plan *plan);
     double (*cost_ms)(const struct render_plan *plan); /* when it is active (cost.h)  */
+    double start_ms;                                   /* of the first picture, beside its programs   */
     double (*error)(const struct render_plan *plan);   /* NULL: it leaves none        */
     const struct render_pass *passes;
     size_t pass_count;
@@ -99,6 +106,7 @@ enum render_size {
     RENDER_SIZE_SHADOW,
     RENDER_SIZE_LIGHT_BLOCKS,  /* a texel for each block of a light's view, render_plan_shadow_block_px a
                                   side */
+    RENDER_SIZE_MAP_BLOCKS,    /* the same of a translucent shadow map, RENDER_MAP_BLOCK a side */
     RENDER_SIZE_SHADOW_BLOCKS, /* a texel for each block of them, RENDER_SHADOW_BLOCK a side */
 };
 
@@ -124,11 +132,13 @@ struct render_plan_view {
     bool is_cube_face;
     int face; /* 0..5: +x -x +y -y +z -z                          */
     int size_px;
-    int levels;        /* blocks of 2^levels texels are at most spacing wide */
+    int block_px;      /* blocks of so many texels a side are at most spacing wide */
     double texel_area; /* mm^2; perspective: at distance 1                  */
     size_t object;     /* of translucent shadow maps, and where is_of_object: whose light it holds */
     bool is_of_object; /* shows that object alone; others do not hide it       */
     bool is_repeated;  /* the view before is of the same light: passes that are not of samples are done */
+    int layer; /* shows what faces the light behind so many such surfaces of the object: those that the view
+                  before it shows, and others. theory.md T71 */
 };
 
 /* What shadows of one of the lights' views are looked up in. theory.md T67. */
@@ -138,16 +148,23 @@ struct render_plan_shadow {
     double nearest_mm; /* along the axis: nothing that blocks is nearer to the light */
     double
         light_size; /* point: diameter in mm; parallel: of its disc at distance 1; 0: it has no penumbras */
+    double surface_count; /* about so many of blockers that let light through, in all texels  */
+    double share;         /* about so much of what the light lights, blockers may be before   */
 };
 
-enum { RENDER_SHADOW_BLOCK = 16 };
+enum { RENDER_SHADOW_BLOCK = 16, RENDER_MAP_BLOCK = 4 };
 
 /* What blocks light, of lights that shine; all 0 in a scene with neither blockers nor such lights. */
 struct render_plan_shadows {
     bool is_called_for; /* else the lights' views do for shadows */
-    size_t blocker_count, translucent_count, coloured_count, soft_light_count, spot_count, triangle_count;
+    size_t blocker_count, translucent_count, coloured_count, soft_light_count, spot_count, triangle_count,
+        opaque_triangle_count;
+    size_t object_count; /* that let light through: counted as translucent, too, but not as blockers */
+    size_t layer_count;  /* of views of what lies behind an object's first surface */
+    struct render_casters casters;
     int node_limit, tap_count, size_px;
     struct render_plan_shadow *of_view; /* NULL: not called for */
+    struct render_plan_shadow *of_map;  /* the same of translucent shadow maps */
 };
 
 struct render_plan_pass {
@@ -190,10 +207,12 @@ struct render_plan {
     double grid_texel_mm; /* across the view, at the widest */
     enum render_coherence coherence; /* never AUTO; NONE where no light samples move */
     enum render_gather gather;       /* never AUTO; C unless the technique is GATHER */
-    char gather_reason[96];          /* why */
+    char gather_reason[128];         /* why */
     bool has_gpu;                    /* OpenGL is not software */
     size_t deformed_vertex_count, moved_vertex_count;
     double epsilon;
+    double budget_ms; /* that it was chosen for; 0: none */
+    double beside_ms; /* predicted of what no effect does */
     const struct render_media *media;
     struct render_media *own_media; /* when the request brought none                    */
     struct render_plan_object *objects;
@@ -208,7 +227,11 @@ struct render_plan {
     struct render_environment *own_environment;   /* when the request brought none                    */
     struct render_irradiance **irradiance;        /* of each medium; NULL where it lights nothing     */
     int environment_order;                        /* the highest of any medium                        */
+    double irradiance_tolerance;                  /* of tables of irradiance, by its mean         */
+    double irradiance_nodes, irradiance_terms;    /* of all tables; and terms m that they sum         */
+    int visibility_ray_count;                     /* from each sample, through what is in the way     */
     int peel_side_px;                             /* of the largest layer; 0 unless peeled            */
+    int peel_axis_count;                          /* that layers are peeled along; 0: none            */
     size_t triangle_count;
     double covered_px; /* pixels that objects may cover, at most all       */
 
@@ -250,13 +273,30 @@ DIPOLE_CHECKED bool render_plan_create(const struct render_request *request, str
                                        dipole_status *status);
 void render_plan_destroy(struct render_plan *plan);
 
+/* What the picture is predicted to take: all effects, and beside_ms. */
+double render_plan_cost_ms(const struct render_plan *plan);
+
+/*
+ * Of a request with a budget: set epsilon to the least of RENDER_BUDGET_EPSILON_MIN to RENDER_EPSILON_MAX,
+ * in steps of a tenth of a decade, whose plan is predicted to take no longer; to the largest when all take
+ * longer, and render_plan_create says so in a note. Does nothing without a budget. Fails as
+ * render_plan_create does.
+ */
+DIPOLE_CHECKED bool render_plan_spend_budget(struct render_request *request, dipole_status *status);
+
 /* Fails for an epsilon out of range, a picture that is too large, or too many lights. */
 DIPOLE_CHECKED bool render_plan_check_request(const struct io_scene *scene, double epsilon,
                                               dipole_status *status);
 
-/* Texels a side of a block of the lights' views whose shadow is looked up once: at most half as wide as
- * light samples are apart. */
+/* Whether nothing asks for shadows of the lights' views: maps have their own. */
+bool render_plan_shades_maps_alone(const struct render_plan *plan);
+
+/* Texels a side of a block of the lights' views whose shadow is looked up once: at most as wide as light
+ * samples are apart, where no light has a size half as wide. */
 int render_plan_shadow_block_px(const struct render_plan *plan);
+
+/* Views whose shadows are looked up in a map of their own: those of one light's objects share it. */
+size_t render_plan_shadow_map_count(const struct render_plan *plan);
 
 /* Whether a light is not black. */
 bool render_light_shines(const struct io_light *light);
@@ -293,6 +333,8 @@ bool render_plan_wants(const struct render_plan *plan, const char *texture);
 /* Slices of a volume for so many samples, 0: the usual number; 0 when there is no such pattern. */
 int render_plan_slice_count(int sample_count);
 
+/* Texels of a peeled layer are so wide, as part of the spacing: patches as fine as those of triangles. */
+#define RENDER_PEEL_SHARE 0.35
 /* Texels a side of an object's peeled layers; 0 where it is not sampled. */
 int render_plan_peel_side_px(const struct render_plan *plan, size_t object);
 /* The axis of RENDER_ENVIRONMENT_PEEL: y. */

@@ -213,12 +213,18 @@ static void limit_samples(const struct render_request *request, struct render_pl
     plan->spacing_mm = least_mm;
 }
 
+static double limit_or(double limit, double share)
+{
+    return limit > 0 ? limit : share;
+}
+
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan)
 {
-    plan->truncation_epsilon = TRUNCATION_SHARE * plan->epsilon;
-    plan->aliasing_epsilon = ALIASING_SHARE * plan->epsilon;
+    const struct render_limits *const limits = &request->limits;
+    plan->truncation_epsilon = limit_or(limits->truncation, TRUNCATION_SHARE * plan->epsilon);
+    plan->aliasing_epsilon = limit_or(limits->aliasing, ALIASING_SHARE * plan->epsilon);
     plan->banding_epsilon = BANDING_SHARE * plan->epsilon;
-    plan->table_epsilon = fmax(TABLE_SHARE * plan->epsilon, LUT_EPSILON_MIN);
+    plan->table_epsilon = fmax(limit_or(limits->table, TABLE_SHARE * plan->epsilon), LUT_EPSILON_MIN);
     plan->spacing_mm = INFINITY;
     for (size_t m = 0; m < plan->media->count; m++)
         spend_on_medium(request, plan, m);
@@ -310,8 +316,9 @@ void render_plan_settle_spacing(const struct render_request *request, struct ren
     const double texel_mm = render_plan_widest_spacing_mm(plan);
     if (plan->technique == RENDER_TECHNIQUE_GATHER) {
         const double share = GATHER_BANDING_SHARE - (plan->environment ? RENDER_ENVIRONMENT_SHARE : 0);
-        plan->banding_epsilon = share * plan->epsilon;
-        plan->interpolation_epsilon = GATHER_INTERPOLATION_SHARE * plan->epsilon;
+        plan->banding_epsilon = limit_or(request->limits.banding, share * plan->epsilon);
+        plan->interpolation_epsilon =
+            limit_or(request->limits.interpolation, GATHER_INTERPOLATION_SHARE * plan->epsilon);
     }
     for (size_t m = 0; m < plan->media->count; m++)
         settle_medium(request, plan, m, texel_mm);

@@ -1,12 +1,10 @@
 /* Light from all around in the plan: what it is, to which order, sampled how finely. */
 #include "renderer/environment_visibility.h"
+#include "renderer/irradiance_table.h"
 #include "renderer/plan_internal.h"
 
 #include <math.h>
 #include <stdlib.h>
-
-/* Texels of a peeled layer are so wide, as part of the spacing: patches as fine as those of triangles. */
-#define PEEL_SHARE 0.35
 
 enum { PEEL_SIDE_MIN = 16, PEEL_SIDE_MAX = 2048 };
 
@@ -47,12 +45,13 @@ static const char *why_not(const struct render_plan *plan)
 int render_plan_peel_side_px(const struct render_plan *plan, size_t object)
 {
     const struct render_plan_object *const planned = &plan->objects[object];
-    const double wanted = ceil(2.02 * planned->ball.radius_mm / (PEEL_SHARE * planned->spacing_mm));
+    const double wanted = ceil(2.02 * planned->ball.radius_mm / (RENDER_PEEL_SHARE * planned->spacing_mm));
     return planned->spacing_mm > 0 ? (int)fmin(fmax(wanted, PEEL_SIDE_MIN), PEEL_SIDE_MAX) : 0;
 }
 
 static void choose_peel_size(const struct render_request *request, struct render_plan *plan)
 {
+    plan->peel_axis_count = request->environment_samples == RENDER_ENVIRONMENT_PEEL ? 1 : 3;
     for (size_t i = 0; i < request->scene->object_count; i++) {
         const int side_px = render_plan_peel_side_px(plan, i);
         plan->peel_side_px = side_px > plan->peel_side_px ? side_px : plan->peel_side_px;
@@ -62,6 +61,19 @@ static void choose_peel_size(const struct render_request *request, struct render
                              "peeled layers are limited to %d texels a side: light samples are as far "
                              "apart as those",
                              PEEL_SIDE_MAX);
+}
+
+/* What a medium's light adds to what all have to do, and err by. */
+static void measure_irradiance(const struct render_irradiance *irradiance, struct render_plan *plan)
+{
+    double error;
+    const int rows = render_irradiance_table_rows(irradiance, plan->irradiance_tolerance, &error);
+    const double nodes = (double)render_irradiance_table_nodes(rows);
+    plan->irradiance_nodes += nodes;
+    plan->irradiance_terms += nodes * (irradiance->order + 1);
+    plan->environment_error = fmax(plan->environment_error, irradiance->error + error);
+    if (irradiance->order > plan->environment_order)
+        plan->environment_order = irradiance->order;
 }
 
 bool render_plan_light_from_around(const struct render_request *request, struct render_plan *plan,
@@ -75,6 +87,9 @@ bool render_plan_light_from_around(const struct render_request *request, struct 
         plan->environment = NULL;
         return true;
     }
+    const double share = (RENDER_ENVIRONMENT_SHARE - RENDER_IRRADIANCE_SHARE) * plan->epsilon;
+    const double epsilon = request->limits.environment > 0 ? request->limits.environment : share;
+    plan->irradiance_tolerance = RENDER_IRRADIANCE_SHARE * plan->epsilon;
     plan->irradiance = calloc(plan->media->count, sizeof(struct render_irradiance *));
     if (!plan->irradiance)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the light in %zu media",
@@ -83,21 +98,20 @@ bool render_plan_light_from_around(const struct render_request *request, struct 
         const struct render_medium *const medium = &plan->media->media[m];
         if (!plan->of_medium[m].is_visible || !medium->has_scattering)
             continue;
-        if (!render_irradiance_create(plan->environment, medium->eta,
-                                      RENDER_ENVIRONMENT_SHARE * plan->epsilon, &plan->irradiance[m],
+        if (!render_irradiance_create(plan->environment, medium->eta, epsilon, &plan->irradiance[m],
                                       status))
             return false;
-        plan->environment_error = fmax(plan->environment_error, plan->irradiance[m]->error);
-        if (plan->irradiance[m]->order > plan->environment_order)
-            plan->environment_order = plan->irradiance[m]->order;
+        measure_irradiance(plan->irradiance[m], plan);
     }
     plan->has_environment = true;
-    if (plan->environment_error > RENDER_ENVIRONMENT_SHARE * plan->epsilon)
+    plan->visibility_ray_count = request->ambient_visibility;
+    const double asked = epsilon + plan->irradiance_tolerance;
+    if (plan->environment_error > asked)
         render_plan_add_note(
             plan,
             "the environment is drawn to order %d: what is above adds up to %.2g of its mean, "
             "%.2g were asked",
-            plan->environment_order, plan->environment_error, RENDER_ENVIRONMENT_SHARE * plan->epsilon);
+            plan->environment_order, plan->environment_error, asked);
     if (plan->has_specular)
         render_plan_add_note(plan, "gloss does not mirror the environment");
     if (render_plan_sums_samples(plan) && request->environment_samples != RENDER_ENVIRONMENT_SURFACE)

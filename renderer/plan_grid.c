@@ -134,7 +134,7 @@ bool render_plan_choose_grids(const struct render_request *request, struct rende
         if (request->splat_grid == RENDER_SPLAT_GRID_AUTO)
             side_px = ceil(width_mm(&view->projection) / narrowest_mm(plan) * (1 - 1e-9));
         view->size_px = (int)fmax(fmin(side_px, limit_px), RENDER_SPLAT_GRID_MIN);
-        view->levels = 0;
+        view->block_px = 1;
         const double texel = 2 * view->projection.half_width / view->size_px;
         view->texel_area = texel * texel;
     }

@@ -8,8 +8,10 @@
  * all views together: RENDER_LIGHT_SAMPLE_LIMIT texels, since each may become a sample. */
 enum { RENDER_VIEW_SIDE_LIMIT = 4096 };
 
-/* Part of epsilon that harmonics left out of an environment may add, by their bound. */
+/* Part of epsilon that light from all around may err by: harmonics left out, by their bound, and of that
+ * the tables of irradiance, by theirs. */
 #define RENDER_ENVIRONMENT_SHARE 0.1
+#define RENDER_IRRADIANCE_SHARE 0.02
 
 void render_plan_add_note(struct render_plan *plan, const char *format, ...) DIPOLE_PRINTF(2, 3);
 
@@ -26,6 +28,9 @@ void render_plan_forget_environment(struct render_plan *plan);
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan);
 void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan);
 void render_plan_predict_error(const struct render_request *request, struct render_plan *plan);
+
+/* plan_search.c: once costs are known; says so when the budget is exceeded, and what by. */
+void render_plan_note_budget(const struct render_request *request, struct render_plan *plan);
 
 /* plan_motion.c: before epsilon is spent; and once spacings and the technique are known. */
 void render_plan_look_at_motion(const struct render_request *request, struct render_plan *plan);
@@ -45,6 +50,10 @@ DIPOLE_CHECKED bool render_plan_make_views(const struct render_request *request,
 /* plan_shadows.c: once there are views. */
 DIPOLE_CHECKED bool render_plan_make_shadows(const struct render_request *request, struct render_plan *plan,
                                              dipole_status *status);
+
+/* The same of translucent shadow maps, once there are any. */
+DIPOLE_CHECKED bool render_plan_make_map_shadows(const struct render_request *request,
+                                                 struct render_plan *plan, dipole_status *status);
 
 /* plan_tsm.c: the maps of technique tsm, the pattern of each medium, and what is known of the error. Fails
  * also for options that contradict each other, and for volumes of other media. */

@@ -22,6 +22,7 @@ static const struct render_texture textures[] = {
     { .name = "position_depth", .format = RENDER_DEPTH32F }, /* 0 where no object is                */
     { .name = "object_media", .format = RENDER_OTHER },      /* what each object is made of              */
     { .name = "light_view", .size = RENDER_SIZE_LIGHT_VIEW, .is_far_where_empty = true },
+    { .name = "light_front", .size = RENDER_SIZE_LIGHT_VIEW }, /* of the view before */
     { .name = "light_object", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW },     /* object + 1  */
     { .name = "light_irradiance", .format = RENDER_R32F, .size = RENDER_SIZE_LIGHT_VIEW }, /* per rgb */
     { .name = "light_rest", .size = RENDER_SIZE_LIGHT_VIEW },     /* the surface at rest, mm */
@@ -38,12 +39,13 @@ static const struct render_texture textures[] = {
     { .name = "tsm_position_mm", .size = RENDER_SIZE_MAP, .is_mipmapped = true }, /* times w = coverage */
     { .name = "tsm_normal", .size = RENDER_SIZE_MAP, .is_mipmapped = true },      /* times coverage  */
     { .name = "tsm_flux", .size = RENDER_SIZE_MAP, .is_mipmapped = true }, /* W/mm^2; point light: W/sr */
+    { .name = "tsm_shadow", .size = RENDER_SIZE_MAP_BLOCKS }, /* left of the light, per channel */
     { .name = "tsm_depth", .format = RENDER_DEPTH32F, .size = RENDER_SIZE_MAP },
     { .name = "tsm_layers", .format = RENDER_OTHER, .size = RENDER_SIZE_MAP }, /* depths of surfaces */
     { .name = "tsm_vertices", .format = RENDER_OTHER },                        /* as position_mm    */
     { .name = "tsm_vertex_radiosity", .size = RENDER_SIZE_VERTICES },
     { .name = "tsm_surface_radiosity", .is_multisampled = true }, /* w = object + 1                  */
-    { .name = "environment_harmonics", .format = RENDER_OTHER },  /* kept by environment_draw.c    */
+    { .name = "environment_irradiance", .format = RENDER_OTHER }, /* kept by environment_draw.c    */
     { .name = "environment_tree", .format = RENDER_OTHER },
     { .name = "peel_position_mm", .size = RENDER_SIZE_PEEL }, /* w = object + 1                       */
     { .name = "peel_normal", .size = RENDER_SIZE_PEEL },      /* w = cosine of the facet to the axis  */

@@ -180,7 +180,7 @@ bool render_plan_make_maps(const struct render_request *request, struct render_p
             plan->map_count += object_maps(scene, plan, light, object, &plan->maps[plan->map_count]);
         }
     }
-    return true;
+    return render_plan_make_map_shadows(request, plan, status);
 }
 
 int render_plan_map_side_px(const struct render_plan *plan)

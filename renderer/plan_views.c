@@ -1,5 +1,6 @@
 /* What the lights see: how many views, where from, how finely. */
 #include "renderer/frusta.h"
+#include "renderer/light_samples.h"
 #include "renderer/plan_internal.h"
 
 #include <math.h>
@@ -11,9 +12,7 @@
 
 enum {
     VIEW_SIDE_WANTED = 768, /* shadows are drawn from the same view, so it never is coarser if it can */
-    LEVELS_WANTED = 2,
-    LEVELS_LIMIT = 12,
-    BLOCK_LEVELS_LIMIT = 7, /* blocks are searched once for each level: larger ones save few samples */
+    CELL_WANTED = 4, /* texels a side of a cell in the middle of the depths: slopes are sampled by fewer */
 };
 
 /* A texel of margin on each side, so that no edge is lost to rounding. */
@@ -36,7 +35,7 @@ static int side_limit_px(const struct render_plan *plan)
 }
 
 /* Texels of a view so wide (at its far end) that blocks of them are at most the spacing wide there; where
- * the surface is nearer, blocks of more of them are as wide. */
+ * the surface is nearer, blocks of more of them are as wide. T45 */
 static void choose_view_size(const struct render_plan *plan, struct render_plan_view *view)
 {
     const struct render_projection *const projection = &view->projection;
@@ -45,15 +44,19 @@ static void choose_view_size(const struct render_plan *plan, struct render_plan_
     const double cells = ceil(width_mm / (CELL_SHARE * plan->spacing_mm) * (1 - 1e-9));
     const int limit_px = side_limit_px(plan);
     const int cell_count = cells >= limit_px ? limit_px : cells < 1 ? 1 : (int)cells;
-    int levels = LEVELS_WANTED;
-    while (levels < LEVELS_LIMIT && cell_count << levels < VIEW_SIDE_WANTED)
-        levels++;
-    while (levels > 0 && cell_count << levels > limit_px)
-        levels--;
-    view->size_px = cell_count << levels;
+    const bool is_narrow = !projection->is_orthographic && !view->is_cube_face;
+    const double middle = is_narrow ? sqrt(projection->near_mm / projection->far_mm) : 1;
+    const int wanted_px = (int)fmax(round(CELL_WANTED * middle), 2);
+    int cell_px = (VIEW_SIDE_WANTED + cell_count - 1) / cell_count;
+    cell_px = cell_px > wanted_px ? cell_px : wanted_px;
+    cell_px = cell_px * cell_count > limit_px ? limit_px / cell_count : cell_px;
+    view->size_px = cell_count * cell_px;
     const double nearer =
         projection->is_orthographic ? 0 : ceil(log2(projection->far_mm / projection->near_mm));
-    view->levels = (int)fmin(levels + levels_of_coarsest(plan) + nearer, BLOCK_LEVELS_LIMIT);
+    double block_px = cell_px * exp2(levels_of_coarsest(plan) + nearer);
+    while (block_px > RENDER_LIGHT_BLOCK_LIMIT)
+        block_px /= 2;
+    view->block_px = (int)ceil(block_px);
     const double texel = 2 * projection->half_width / view->size_px;
     view->texel_area = texel * texel;
 }
@@ -67,7 +70,9 @@ static size_t light_views(const struct io_scene *scene, const struct render_plan
     size_t count = 1;
     if (source->kind == IO_LIGHT_POINT)
         count = render_frusta_of_point(source->position_mm, &plan->ball, margin, 1, frusta);
-    else
+    if (count == 1 && source->kind == IO_LIGHT_POINT)
+        render_frustum_narrow(scene->objects, scene->object_count, margin, &frusta[0]);
+    else if (source->kind != IO_LIGHT_POINT)
         render_frustum_of_parallel(source->direction, scene->objects, scene->object_count, &plan->ball,
                                    margin, frusta);
     for (size_t i = 0; i < count; i++)
@@ -88,14 +93,11 @@ double render_plan_widest_spacing_mm(const struct render_plan *plan)
     return widest_mm;
 }
 
-/* Parallel light that only samples are taken of needs no texture: drawing it in memory is several times
- * faster than reading one back. */
+/* What only samples are taken of needs no texture: drawing it in memory is several times faster than
+ * reading one back. */
 static bool can_draw_in_memory(const struct render_request *request, const struct render_plan *plan)
 {
-    bool is_parallel = true;
-    for (size_t i = 0; i < plan->view_count; i++)
-        is_parallel &= plan->views[i].projection.is_orthographic;
-    return is_parallel && !request->has_gpu && render_plan_sums_samples(plan) && !plan->has_specular &&
+    return !request->has_gpu && render_plan_sums_samples(plan) && !plan->has_specular &&
            !request->is_captured && plan->area == RENDER_AREA_FLUX &&
            plan->coherence != RENDER_COHERENCE_SURFACE;
 }

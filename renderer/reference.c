@@ -53,6 +53,7 @@ struct reference {
     double path_mm;                          /* shortest mean free path of all that scatters */
     size_t lit_count;                        /* lights that shine */
     struct render_environment *environment;  /* NULL: none, or black */
+    struct render_casters casters;
     struct render_tracer *tracer;
     struct render_surface *surface;
     struct render_pixel_view view;
@@ -321,8 +322,10 @@ static void explain_integral(struct reference *reference)
     }
     explain(reference, ROW_INTEGRAL, true, "%zu samples, %.3g mm apart; estimated error by doublings: %s",
             report->sample_count, report->spacing_mm, errors);
-    explain(reference, ROW_VISIBILITY, true, "%zu of %zu lights shine; objects shade themselves and others",
-            reference->lit_count, reference->scene->light_count);
+    const struct render_casters *const casters = &reference->casters;
+    explain(reference, ROW_VISIBILITY, true,
+            "%zu of %zu lights shine; objects shade themselves and others; %zu let light through",
+            reference->lit_count, reference->scene->light_count, casters->count - casters->blocker_count);
 }
 
 /* Double the points until the error is small enough in some of the pixels. */
@@ -488,7 +491,10 @@ static bool begin(struct reference *reference, dipole_status *status)
 {
     const struct io_scene *const scene = reference->scene;
     if (!render_plan_check_request(scene, reference->report.epsilon, status) ||
-        !read_media(reference, status) || !render_tracer_create(scene, &reference->tracer, status) ||
+        !read_media(reference, status) ||
+        !render_casters_init(scene, reference->media, reference->report.epsilon, &reference->casters,
+                             status) ||
+        !render_tracer_create_with(scene, &reference->casters, &reference->tracer, status) ||
         !render_plan_check_rays(reference->options->ambient_visibility, status) ||
         (scene->has_environment &&
          !render_environment_read(&scene->environment, &reference->environment, status)))
@@ -519,6 +525,7 @@ static void destroy(struct reference *reference)
     render_sum_destroy(reference->sum);
     render_surface_destroy(reference->surface);
     render_tracer_destroy(reference->tracer);
+    render_casters_end(&reference->casters);
     render_media_destroy(reference->media);
     render_environment_destroy(reference->environment);
     free(reference->pixel_media);
@@ -542,6 +549,7 @@ bool render_reference_draw(const struct io_scene *scene, const struct render_opt
     reference->options = options;
     reference->wanted_error = RENDER_REFERENCE_SHARE * epsilon;
     reference->report = (struct render_report){ .technique = RENDER_TECHNIQUE_REFERENCE,
+                                                .predicted_ms = (double)NAN,
                                                 .epsilon = epsilon,
                                                 .effect_count = ROW_COUNT };
     for (int row = 0; row < ROW_COUNT; row++)

@@ -105,7 +105,8 @@ bool render_light_reaches(const struct render_tracer *tracer, const struct io_li
         onward[k] = -to_light[k];
     *falloff_out *= render_light_spot_part(light, onward);
     if (!(render_dot(point->facet_normal, to_light) > 0) || !(*falloff_out > 0) ||
-        !render_tracer_is_clear(tracer, point->position_mm, point->facet_normal, to_light, away_mm))
+        !render_tracer_is_clear_of_opaque(tracer, point->position_mm, point->facet_normal, to_light,
+                                          away_mm))
         return false;
     render_tracer_left(tracer, point->position_mm, to_light, away_mm, left);
     return true;

@@ -21,9 +21,12 @@
 
 struct render_tracer {
     const struct io_scene *scene;
+    const struct io_blocker *casters; /* blockers, and objects that let light through */
+    size_t caster_count;
     RTCDevice device;
     RTCScene triangles;       /* geometry i is object i */
-    RTCScene blockers;        /* geometry i is blocker i; NULL: there are none */
+    RTCScene opaque;          /* the same without objects that let light through; NULL: there are none */
+    RTCScene blockers;        /* geometry i is caster i; NULL: there are none */
     double lift_mm, reach_mm; /* reach: no longer is what holds all blockers */
 };
 
@@ -77,12 +80,11 @@ static bool add_particles(struct render_tracer *tracer, const struct io_blocker 
 
 static bool add_blockers(struct render_tracer *tracer, dipole_status *status)
 {
-    const struct io_scene *const scene = tracer->scene;
     tracer->blockers = rtcNewScene(tracer->device);
     rtcSetSceneFlags(tracer->blockers, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
     bool done = check(tracer, "a scene", status);
-    for (size_t i = 0; done && i < scene->blocker_count; i++) {
-        const struct io_blocker *const blocker = &scene->blockers[i];
+    for (size_t i = 0; done && i < tracer->caster_count; i++) {
+        const struct io_blocker *const blocker = &tracer->casters[i];
         done = blocker->particle_mm > 0
                    ? add_particles(tracer, blocker, (unsigned)i, status)
                    : add_object(tracer, tracer->blockers, blocker->mesh, (unsigned)i, status);
@@ -95,14 +97,36 @@ static bool add_blockers(struct render_tracer *tracer, dipole_status *status)
     return done && check(tracer, "a tree", status);
 }
 
+static bool add_objects(struct render_tracer *tracer, const bool *left_out, RTCScene *scene_out,
+                        dipole_status *status)
+{
+    *scene_out = rtcNewScene(tracer->device);
+    rtcSetSceneFlags(*scene_out, RTC_SCENE_FLAG_ROBUST);
+    bool done = check(tracer, "a scene", status);
+    for (size_t i = 0; done && i < tracer->scene->object_count; i++)
+        done = (left_out && left_out[i]) ||
+               add_object(tracer, *scene_out, tracer->scene->objects[i].mesh, (unsigned)i, status);
+    if (done)
+        rtcCommitScene(*scene_out);
+    return done && check(tracer, "a tree", status);
+}
+
 bool render_tracer_create(const struct io_scene *scene, struct render_tracer **tracer_out,
                           dipole_status *status)
+{
+    return render_tracer_create_with(scene, NULL, tracer_out, status);
+}
+
+bool render_tracer_create_with(const struct io_scene *scene, const struct render_casters *casters,
+                               struct render_tracer **tracer_out, dipole_status *status)
 {
     *tracer_out = NULL;
     struct render_tracer *const tracer = calloc(1, sizeof *tracer);
     if (!tracer)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to trace rays");
     tracer->scene = scene;
+    tracer->casters = casters ? casters->casters : scene->blockers;
+    tracer->caster_count = casters ? casters->count : scene->blocker_count;
     double largest_mm = 0;
     for (int k = 0; k < 3; k++)
         largest_mm = fmax(largest_mm, fmax(fabs(scene->min_mm[k]), fabs(scene->max_mm[k])));
@@ -110,18 +134,10 @@ bool render_tracer_create(const struct io_scene *scene, struct render_tracer **t
     /* One thread builds the same tree each time, so that ties between triangles end the same way. */
     tracer->device = rtcNewDevice("threads=1,set_affinity=0");
     bool done = check(tracer, "a device", status);
-    if (done) {
-        tracer->triangles = rtcNewScene(tracer->device);
-        rtcSetSceneFlags(tracer->triangles, RTC_SCENE_FLAG_ROBUST);
-        done = check(tracer, "a scene", status);
-    }
-    for (size_t i = 0; done && i < scene->object_count; i++)
-        done = add_object(tracer, tracer->triangles, scene->objects[i].mesh, (unsigned)i, status);
-    if (done) {
-        rtcCommitScene(tracer->triangles);
-        done = check(tracer, "a tree", status);
-    }
-    if (done && scene->blocker_count > 0)
+    done = done && add_objects(tracer, NULL, &tracer->triangles, status);
+    if (done && casters && casters->count > casters->blocker_count)
+        done = add_objects(tracer, casters->lets_through, &tracer->opaque, status);
+    if (done && tracer->caster_count > 0)
         done = add_blockers(tracer, status);
     if (done)
         *tracer_out = tracer;
@@ -136,6 +152,8 @@ void render_tracer_destroy(struct render_tracer *tracer)
         return;
     if (tracer->triangles)
         rtcReleaseScene(tracer->triangles);
+    if (tracer->opaque)
+        rtcReleaseScene(tracer->opaque);
     if (tracer->blockers)
         rtcReleaseScene(tracer->blockers);
     if (tracer->device)
@@ -205,8 +223,8 @@ bool render_tracer_find(const struct render_tracer *tracer, const double origin_
     return true;
 }
 
-bool render_tracer_is_clear(const struct render_tracer *tracer, const double position_mm[3],
-                            const double facet_normal[3], const double direction[3], double distance_mm)
+static bool is_clear(const struct render_tracer *tracer, RTCScene triangles, const double position_mm[3],
+                     const double facet_normal[3], const double direction[3], double distance_mm)
 {
     double origin_mm[3];
     for (int k = 0; k < 3; k++)
@@ -214,8 +232,22 @@ bool render_tracer_is_clear(const struct render_tracer *tracer, const double pos
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     struct RTCRay ray = ray_of(origin_mm, direction, distance_mm);
-    rtcOccluded1(tracer->triangles, &context, &ray);
+    rtcOccluded1(triangles, &context, &ray);
     return ray.tfar > 0; /* -infinity: something is hit */
+}
+
+bool render_tracer_is_clear(const struct render_tracer *tracer, const double position_mm[3],
+                            const double facet_normal[3], const double direction[3], double distance_mm)
+{
+    return is_clear(tracer, tracer->triangles, position_mm, facet_normal, direction, distance_mm);
+}
+
+bool render_tracer_is_clear_of_opaque(const struct render_tracer *tracer, const double position_mm[3],
+                                      const double facet_normal[3], const double direction[3],
+                                      double distance_mm)
+{
+    return is_clear(tracer, tracer->opaque ? tracer->opaque : tracer->triangles, position_mm, facet_normal,
+                    direction, distance_mm);
 }
 
 /* ---- blockers ------------------------------------------------------------------------------------ */
@@ -297,7 +329,7 @@ void render_tracer_left(const struct render_tracer *tracer, const double positio
         segments = malloc(list.count * sizeof *segments);
     if (segments && !list.is_short) {
         const size_t count = render_crossings_pair(
-            tracer->scene->blockers, list.crossings, list.count,
+            tracer->casters, list.crossings, list.count,
             isfinite(distance_mm) ? -(tracer->reach_mm + distance_mm) : INFINITY, 1, segments);
         for (size_t i = 0; i < count; i++)
             take_segment(&segments[i], -tracer->reach_mm, left);

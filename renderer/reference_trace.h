@@ -2,13 +2,20 @@
 #ifndef RENDERER_REFERENCE_TRACE_H
 #define RENDERER_REFERENCE_TRACE_H
 
+#include "renderer/casters.h"
 #include "renderer/reference_surface.h"
 
 struct render_tracer;
 
-/* Fails with DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED. The scene must outlive the tracer. */
+/* Fails with DIPOLE_OUT_OF_MEMORY or DIPOLE_NOT_SUPPORTED. The scene must outlive the tracer. All objects
+ * are opaque. */
 DIPOLE_CHECKED bool render_tracer_create(const struct io_scene *scene, struct render_tracer **tracer_out,
                                          dipole_status *status);
+
+/* The same, but light comes through the objects among the casters, which must outlive it, too. */
+DIPOLE_CHECKED bool render_tracer_create_with(const struct io_scene *scene,
+                                              const struct render_casters *casters,
+                                              struct render_tracer **tracer_out, dipole_status *status);
 void render_tracer_destroy(struct render_tracer *tracer);
 
 /* The first surface from origin_mm along direction (any length > 0); false when there is none. For any
@@ -21,7 +28,12 @@ bool render_tracer_find(const struct render_tracer *tracer, const double origin_
 bool render_tracer_is_clear(const struct render_tracer *tracer, const double position_mm[3],
                             const double facet_normal[3], const double direction[3], double distance_mm);
 
-/* What the scene's blockers leave of light that goes along -direction (a unit vector) to a point, per
+/* The same of what lets no light through. */
+bool render_tracer_is_clear_of_opaque(const struct render_tracer *tracer, const double position_mm[3],
+                                      const double facet_normal[3], const double direction[3],
+                                      double distance_mm);
+
+/* What casters leave of light that goes along -direction (a unit vector) to a point, per
  * channel, from distance_mm away (INFINITY: from the end); exact but for float's rounding of where they
  * are. theory.md T66. For any number of threads at once; without memory for more than some hundred blockers
  * along a ray, nothing is left. */

@@ -19,6 +19,18 @@ static double now_ms(void)
     return (double)now.tv_sec * 1e3 + (double)now.tv_nsec * 1e-6;
 }
 
+/* By the file that accuracy --calibrate left, if it did; a damaged one is none. */
+static void calibrate(struct renderer *renderer)
+{
+    char path[4096], driver[RENDER_MACHINE_TEXT];
+    snprintf(driver, sizeof driver, "%s, OpenGL %s", (const char *)glGetString(GL_RENDERER),
+             (const char *)glGetString(GL_VERSION));
+    render_machine_identify(driver, &renderer->machine);
+    renderer->is_calibrated =
+        render_calibration_path(&renderer->machine, path, sizeof path, NULL) &&
+        render_calibration_read(path, &renderer->machine, &renderer->calibration, NULL);
+}
+
 bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                    struct renderer **renderer_out, dipole_status *status)
 {
@@ -36,6 +48,7 @@ bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                       render_executor_create(scene, &renderer->errors, &renderer->executor, status);
     if (done) {
         renderer->has_gpu = !render_gl_is_software();
+        calibrate(renderer);
         *renderer_out = renderer;
     } else {
         render_destroy(renderer);
@@ -90,6 +103,7 @@ static bool tables_for(struct renderer *renderer, const struct render_request *r
     if (request->tables || !render_plan_reads(plan, "light_samples"))
         return true;
     if (!renderer->tables || renderer->tables->epsilon > plan->table_epsilon) {
+        render_executor_forget_tables(renderer->executor);
         render_tables_destroy(renderer->tables);
         renderer->tables = NULL;
         if (!render_tables_bake(renderer->media, plan->table_epsilon, &renderer->tables, status))
@@ -110,6 +124,9 @@ static bool add_volumes(struct renderer *renderer, struct render_request *reques
         return true;
     if (!renderer->volumes || renderer->volumes->epsilon > epsilon ||
         renderer->volumes->slice_count != slice_count) {
+        if (!render_make_current(renderer, status))
+            return false;
+        render_executor_forget_tables(renderer->executor);
         render_volumes_destroy(renderer->volumes);
         renderer->volumes = NULL;
         if (!render_volumes_bake(renderer->media, epsilon, slice_count, &renderer->volumes, status))
@@ -119,25 +136,46 @@ static bool add_volumes(struct renderer *renderer, struct render_request *reques
     return true;
 }
 
+/* Take the scene's map again if its scale or turn have changed. */
+static bool follow_environment(struct renderer *renderer, dipole_status *status)
+{
+    const struct io_environment *const wanted = &renderer->scene->environment;
+    struct render_environment *const known = renderer->environment, *renewed;
+    if (!known || (known->rotate_rad == wanted->rotate_rad && known->rgb[0] == wanted->rgb[0] &&
+                   known->rgb[1] == wanted->rgb[1] && known->rgb[2] == wanted->rgb[2]))
+        return true;
+    if (!render_environment_read(wanted, &renewed, status))
+        return false;
+    render_environment_destroy(known);
+    renderer->environment = renewed;
+    return true;
+}
+
 bool render_run(struct renderer *renderer, const struct render_request *request_in,
                 struct render_plan **plan_out, double time_ms[RENDER_EFFECT_LIMIT], dipole_status *status)
 {
     const struct render_table *tables;
     struct render_request request = *request_in;
+    *plan_out = NULL;
+    if (!follow_environment(renderer, status))
+        return false;
     request.environment = renderer->environment;
     request.has_gpu = renderer->has_gpu;
-    *plan_out = NULL;
+    request.calibration = renderer->is_calibrated ? &renderer->calibration : NULL;
+    request.is_warm = request_in->is_warm || renderer->is_warm;
     struct render_plan *plan = NULL;
     render_media_measure(renderer->scene, renderer->media);
     const bool done =
         render_plan_check_request(request.scene, request.epsilon, status) &&
-        add_volumes(renderer, &request, status) && render_plan_create(&request, &plan, status) &&
-        render_make_current(renderer, status) && tables_for(renderer, &request, plan, &tables, status) &&
+        render_plan_spend_budget(&request, status) && add_volumes(renderer, &request, status) &&
+        render_plan_create(&request, &plan, status) && render_make_current(renderer, status) &&
+        tables_for(renderer, &request, plan, &tables, status) &&
         render_executor_run(renderer->executor, &request, plan, tables, request.volumes, time_ms, status);
     if (done)
         *plan_out = plan;
     else
         render_plan_destroy(plan);
+    renderer->is_warm = renderer->is_warm || done;
     return done;
 }
 
@@ -149,6 +187,8 @@ void render_fill_report(const struct renderer *renderer, const struct render_pla
     *report = (struct render_report){
         .technique = plan->technique,
         .epsilon = plan->epsilon,
+        .budget_ms = plan->budget_ms,
+        .predicted_ms = render_plan_cost_ms(plan),
         .error_predicted = plan->error_predicted,
         .truncation_error = plan->truncation_error,
         .aliasing_error = plan->aliasing_error,
@@ -203,13 +243,10 @@ static void set_attributes(struct io_image *image, const struct render_plan *pla
     }
 }
 
-bool render_draw(struct renderer *renderer, const struct render_options *options,
-                 struct io_image **image_out, struct render_report *report_out, dipole_status *status)
+struct render_request render_request_for(const struct renderer *renderer,
+                                         const struct render_options *options)
 {
-    if (options->technique == RENDER_TECHNIQUE_REFERENCE)
-        return false;
-    const double start_ms = now_ms();
-    const struct render_request request = {
+    return (struct render_request){
         .scene = renderer->scene,
         .technique = options->technique,
         .area = options->area,
@@ -217,6 +254,9 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .splat_grid = options->splat_grid,
         .gather = options->gather,
         .epsilon = options->epsilon > 0 ? options->epsilon : RENDER_EPSILON_DEFAULT,
+        .budget_ms = options->budget_ms,
+        .is_warm = options->is_warm,
+        .limits = options->limits,
         .media = renderer->media,
         .tables = options->tables,
         .volumes = options->volumes,
@@ -226,6 +266,15 @@ bool render_draw(struct renderer *renderer, const struct render_options *options
         .ambient_visibility = options->ambient_visibility,
         .is_tone_mapped = options->is_tone_mapped,
     };
+}
+
+bool render_draw(struct renderer *renderer, const struct render_options *options,
+                 struct io_image **image_out, struct render_report *report_out, dipole_status *status)
+{
+    if (options->technique == RENDER_TECHNIQUE_REFERENCE)
+        return false;
+    const double start_ms = now_ms();
+    const struct render_request request = render_request_for(renderer, options);
     double time_ms[RENDER_EFFECT_LIMIT];
     struct render_plan *plan = NULL;
     struct io_image *image = NULL;

@@ -68,6 +68,11 @@ extern const char *const render_environment_samples_names[]; /* "surface", "peel
 #define RENDER_EPSILON_DEFAULT 0.01
 #define RENDER_EPSILON_MIN 1e-5
 #define RENDER_EPSILON_MAX 0.5
+/* The least that a budget is spent on: below it what is not predicted, edges and gloss, errs more, and some
+ * media have no such tables. */
+#define RENDER_BUDGET_EPSILON_MIN 0.003
+#define RENDER_BUDGET_MS_MIN 0.1
+#define RENDER_BUDGET_MS_MAX 1e7
 
 /* Gathering sums in single precision by piecewise cubics, which keep no less. */
 #define RENDER_GATHER_EPSILON_MIN 0.003
@@ -91,9 +96,10 @@ struct renderer;
 
 /*
  * Get an OpenGL context and take the scene's meshes to it. The scene must outlive the renderer; its camera
- * and lights may change between calls, its objects by io_scene_set_frame alone, what they are made of only
- * as render_renew_materials says, its environment may not. Fails as render_environment_read does, with
- * DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each failed) or DIPOLE_OUT_OF_MEMORY.
+ * and lights may change between calls, its environment's scale and turn, too, its objects by
+ * io_scene_set_frame alone, what they are made of only as render_renew_materials says. Fails as
+ * render_environment_read does, with DIPOLE_NOT_SUPPORTED (no context: says which were tried and why each
+ * failed) or DIPOLE_OUT_OF_MEMORY.
  */
 DIPOLE_CHECKED bool render_create(const struct io_scene *scene, enum render_context_kind kind,
                                   struct renderer **renderer_out, dipole_status *status);
@@ -145,11 +151,20 @@ struct render_tsm_options {
 };
 enum { RENDER_TSM_LAYER_LIMIT = 16, RENDER_TSM_USUAL_SAMPLES = 21 };
 
+/* What the taps' turn in each pixel is fixed to: others than the first for comparison. */
+enum render_shadow_turn {
+    RENDER_SHADOW_TURN_SCREEN = 0,
+    RENDER_SHADOW_TURN_SURFACE,
+    RENDER_SHADOW_TURN_NONE
+};
+
 /* Of scenes with blockers or lights with a size alone. */
 struct render_shadow_options {
     int node_limit; /* of a texel's transmittance: 0: RENDER_SHADOW_NODES; INT_MAX: all there are */
     int tap_count;  /* of the search and of the filter each; 0: RENDER_SHADOW_TAPS */
     int side_px;    /* of the maps; 0: RENDER_SHADOW_SIDE */
+    enum render_shadow_turn turn;
+    const double (*taps)[2]; /* tap_count places in the disc of radius 1; NULL: those of T68 */
 };
 enum {
     RENDER_SHADOW_NODES = 8,
@@ -159,9 +174,19 @@ enum {
     RENDER_SHADOW_SIDE_LIMIT = 2048
 };
 
+/* What parts of the error may be, in place of their shares of epsilon: to measure what each costs. 0: the
+ * share. */
+struct render_limits {
+    double truncation, aliasing, banding, interpolation, table, environment;
+};
+
 struct render_options {
     enum render_technique technique;
-    double epsilon; /* 0: RENDER_EPSILON_DEFAULT                              */
+    double epsilon;   /* 0: RENDER_EPSILON_DEFAULT                              */
+    double budget_ms; /* 0: none; else in place of epsilon the least error whose picture is predicted to
+                         take no longer */
+    bool is_warm;     /* of a budget: the pictures after the first are to keep to it */
+    struct render_limits limits;
     enum render_area area;
     enum render_coherence coherence;
     int splat_grid; /* of splats alone; 0: samples follow the surface, summed in bands */
@@ -182,7 +207,7 @@ struct render_options {
     int light_place_count; /* points that a light with a size is taken for; 0: RENDER_LIGHT_PLACES */
 };
 
-enum { RENDER_EFFECT_LIMIT = 40, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
+enum { RENDER_EFFECT_LIMIT = 48, RENDER_NOTE_LIMIT = 4, RENDER_DOUBLING_LIMIT = 32 };
 
 /* One step of the reference: surface samples so far, and the error estimated from them. */
 struct render_doubling {
@@ -203,6 +228,8 @@ struct render_effect_report {
 struct render_report {
     enum render_technique technique; /* never AUTO */
     double epsilon;
+    double budget_ms;       /* that epsilon was chosen for; 0: it was asked for */
+    double predicted_ms;    /* of the whole picture; NAN: of the reference nothing is predicted */
     double error_predicted; /* the sum of these six; of the reference estimated; INFINITY: not bounded */
     double truncation_error, aliasing_error, blur_error, banding_error, table_error;
     double environment_error;    /* of the harmonics left out */

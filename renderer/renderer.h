@@ -2,6 +2,7 @@
 #ifndef RENDERER_RENDERER_H
 #define RENDERER_RENDERER_H
 
+#include "renderer/calibration.h"
 #include "renderer/context.h"
 #include "renderer/execute.h"
 #include "renderer/tables.h"
@@ -12,12 +13,20 @@ struct renderer {
     struct render_context *context;
     struct render_gl_errors errors;
     struct render_executor *executor;
+    struct render_machine machine;
     bool has_gpu; /* OpenGL is not software */
+    struct render_calibration calibration;
+    bool is_calibrated; /* else costs are those of another machine */
+    bool is_warm;       /* a picture was drawn */
     struct render_media *media;
     struct render_environment *environment; /* NULL: the scene has none */
     struct render_tables *tables;   /* baked when a plan first needed them, to the finest asked so far */
     struct render_volumes *volumes; /* the same                                                 */
 };
+
+/* What the options ask of this renderer. */
+struct render_request render_request_for(const struct renderer *renderer,
+                                         const struct render_options *options);
 
 DIPOLE_CHECKED bool render_make_current(struct renderer *renderer, dipole_status *status);
 

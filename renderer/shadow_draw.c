@@ -3,14 +3,14 @@
 #include "renderer/area_light.h"
 #include "renderer/crossings.h"
 #include "renderer/shadow_resolve.h"
+#include "renderer/shadow_taps.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Surfaces in a list: at first, and at most; beyond, the map is drawn strip by strip. */
 enum { FIRST_ITEMS = 1 << 18, MOST_ITEMS = 1 << 23, HEADER_SIZE = 8 };
-
-#define GOLDEN_ANGLE_RAD 2.39996322972865332223
 
 struct blocker {
     GLuint vertex_array, vertex_buffer, index_buffer;
@@ -24,6 +24,7 @@ struct render_shadower {
     int ranges_px;
     double nearest_mm; /* of the view that was drawn last: what blocks is no nearer; 0: nothing does */
     struct render_buffer_texture nodes, taps;
+    int tap_count; /* that were made; 0: none, or those of a request */
 };
 
 /* ---- blockers ------------------------------------------------------------------------------------ */
@@ -33,7 +34,7 @@ static void take_blocker(const struct io_blocker *source, struct blocker *blocke
     const struct io_mesh *const mesh = source->mesh;
     glCreateBuffers(1, &blocker->vertex_buffer);
     glNamedBufferStorage(blocker->vertex_buffer, (GLsizeiptr)(3 * mesh->vertex_count * sizeof(float)),
-                         mesh->positions, 0);
+                         mesh->positions, source->motion ? GL_DYNAMIC_STORAGE_BIT : 0);
     glCreateVertexArrays(1, &blocker->vertex_array);
     glVertexArrayVertexBuffer(blocker->vertex_array, 0, blocker->vertex_buffer, 0, 3 * sizeof(float));
     glVertexArrayAttribFormat(blocker->vertex_array, 0, 3, GL_FLOAT, GL_FALSE, 0);
@@ -105,11 +106,28 @@ static void draw_blocker(const struct render_frame *frame, const struct render_s
     render_count_draw(frame);
 }
 
+/* Those that are deformed or move lie elsewhere in each frame. */
+static void pose_blockers(const struct render_shadower *shadower)
+{
+    for (size_t i = 0; i < shadower->scene->blocker_count; i++) {
+        const struct io_blocker *const source = &shadower->scene->blockers[i];
+        if (source->motion)
+            glNamedBufferSubData(shadower->blockers[i].vertex_buffer, 0,
+                                 (GLsizeiptr)(3 * source->mesh->vertex_count * sizeof(float)),
+                                 source->mesh->positions);
+    }
+}
+
 /* ---- uniforms ------------------------------------------------------------------------------------ */
 
 static const struct render_plan_shadow *shadow_of(const struct render_frame *frame)
 {
-    return &frame->plan->shadows.of_view[frame->view - frame->plan->views];
+    const struct render_plan *const plan = frame->plan;
+    for (size_t i = 0; i < plan->map_count; i++) {
+        if (frame->view == &plan->maps[i])
+            return &plan->shadows.of_map[i];
+    }
+    return &plan->shadows.of_view[frame->view - plan->views];
 }
 
 static void set_map(const struct render_frame *frame, GLuint program)
@@ -127,7 +145,26 @@ void render_shadow_bind_map(const struct render_frame *frame)
     set_map(frame, frame->program);
 }
 
-void render_set_shadow(const struct render_frame *frame)
+void render_shadow_bind_nearest(const struct render_frame *frame)
+{
+    const struct render_projection *const projection = &shadow_of(frame)->projection;
+    render_set_float(frame->program, "shadow_half_width",
+                     projection->is_orthographic ? 0 : projection->half_width);
+}
+
+/* Pixels of a view that is width_px wide, for turns that are fixed to the surface. */
+static void set_turn(const struct render_frame *frame, const struct render_projection *seen,
+                     double width_px)
+{
+    const double pixel = 2 * seen->half_width / width_px;
+    render_set_int(frame->program, "shadow_turn_kind", (int)frame->request->shadows.turn);
+    render_set_float(frame->program, "shadow_pixel_mm", seen->is_orthographic ? pixel : 0);
+    render_set_vec4(frame->program, "shadow_pixel_eye_mm", seen->eye_mm[0], seen->eye_mm[1],
+                    seen->eye_mm[2], seen->is_orthographic ? 0 : pixel);
+}
+
+void render_set_shadow(const struct render_frame *frame, const struct render_projection *seen,
+                       double width_px)
 {
     if (!frame->plan->shadows.of_view)
         return;
@@ -135,6 +172,7 @@ void render_set_shadow(const struct render_frame *frame)
     const struct io_light *const light = &frame->request->scene->lights[frame->view->light];
     const GLuint program = frame->program;
     double inner = -2, outer = -2;
+    set_turn(frame, seen, width_px);
     render_set_vec3(program, "shadow_eye_mm", shadow->projection.eye_mm);
     render_set_vec3(program, "shadow_right", shadow->projection.right);
     render_set_vec3(program, "shadow_up", shadow->projection.up);
@@ -180,9 +218,13 @@ bool render_shadow_draw_map(const struct render_frame *frame, dipole_status *sta
     struct render_shadower *shadower;
     if (!render_executor_need_shadower(frame, &shadower, status))
         return false;
+    if (frame->view == frame->plan->views || frame->view == frame->plan->maps)
+        pose_blockers(shadower);
     render_set_float(frame->program, "particle_mm", 0);
-    for (size_t i = 0; i < frame->request->scene->object_count; i++)
-        render_draw_object(frame, i);
+    for (size_t i = 0; i < frame->request->scene->object_count; i++) {
+        if (!frame->plan->shadows.casters.lets_through[i])
+            render_draw_object(frame, i);
+    }
     for (size_t i = 0; i < shadower->scene->blocker_count; i++) {
         if (render_blocker_is_opaque(&shadower->scene->blockers[i]))
             draw_blocker(frame, shadower, frame->program, i);
@@ -227,6 +269,14 @@ static size_t draw_list(const struct render_frame *frame, struct render_shadower
             continue;
         render_set_int(program, "blocker", (int)i);
         draw_blocker(frame, shadower, program, i);
+    }
+    const struct render_casters *const casters = &frame->plan->shadows.casters;
+    struct render_frame listed = *frame;
+    listed.program = program;
+    render_set_float(program, "particle_mm", 0);
+    for (size_t i = casters->blocker_count; i < casters->count; i++) {
+        render_set_int(program, "blocker", (int)i);
+        render_draw_object(&listed, casters->objects[i - casters->blocker_count]);
     }
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
     glGetNamedBufferSubData(shadower->list_buffer, 0, sizeof count, &count);
@@ -320,7 +370,7 @@ bool render_shadow_make_curves(const struct render_frame *frame, dipole_status *
     if (!render_executor_need_shadower(frame, &shadower, status) ||
         !need_list(shadower, FIRST_ITEMS, status))
         return false;
-    struct render_shadow_curves curves = { .blockers = shadower->scene->blockers,
+    struct render_shadow_curves curves = { .blockers = frame->plan->shadows.casters.casters,
                                            .size_px = shadow->size_px,
                                            .node_limit = frame->plan->shadows.node_limit,
                                            .has_colour = frame->plan->shadows.coloured_count > 0,
@@ -344,30 +394,39 @@ bool render_shadow_mark_colour(const struct render_frame *frame, dipole_status *
 
 /* ---- taps ---------------------------------------------------------------------------------------- */
 
-void render_shadow_tap(int index, int count, double place[2])
+static bool upload_taps(struct render_shadower *shadower, const double (*given)[2], int count,
+                        dipole_status *status)
 {
-    const double radius = sqrt((index + 0.5) / count), angle = index * GOLDEN_ANGLE_RAD;
-    place[0] = radius * cos(angle);
-    place[1] = radius * sin(angle);
+    double(*const places)[2] = malloc((size_t)count * sizeof *places);
+    float(*const taps)[2] = malloc((size_t)count * sizeof *taps);
+    bool done = places && taps;
+    if (!done)
+        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %d taps", count);
+    if (done && given)
+        memcpy(places, given, (size_t)count * sizeof *places);
+    else if (done)
+        done = render_shadow_taps(count, places, status);
+    for (int i = 0; done && i < count; i++) {
+        for (int k = 0; k < 2; k++)
+            taps[i][k] = (float)places[i][k];
+    }
+    if (done) {
+        render_buffer_texture_fill(&shadower->taps, GL_RG32F, taps, (size_t)count * sizeof *taps);
+        shadower->tap_count = given ? 0 : count;
+    }
+    free(places);
+    free(taps);
+    return done;
 }
 
 bool render_shadow_fill_taps(const struct render_frame *frame, dipole_status *status)
 {
+    const double(*const given)[2] = frame->request->shadows.taps;
     const int count = frame->plan->shadows.tap_count;
     struct render_shadower *shadower;
-    if (!render_executor_need_shadower(frame, &shadower, status))
+    if (!render_executor_need_shadower(frame, &shadower, status) ||
+        ((given || shadower->tap_count != count) && !upload_taps(shadower, given, count, status)))
         return false;
-    float(*const taps)[2] = malloc((size_t)count * sizeof *taps);
-    if (!taps)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %d taps", count);
-    for (int i = 0; i < count; i++) {
-        double place[2];
-        render_shadow_tap(i, count, place);
-        for (int k = 0; k < 2; k++)
-            taps[i][k] = (float)place[k];
-    }
-    render_buffer_texture_fill(&shadower->taps, GL_RG32F, taps, (size_t)count * sizeof *taps);
-    free(taps);
     render_executor_hand_on(frame->executor, "shadow_taps", shadower->taps.texture);
     return true;
 }

@@ -16,16 +16,16 @@ bool render_shadower_has_program(const struct render_shadower *shadower);
 
 /* Run and bind functions of passes. */
 void render_shadow_bind_map(const struct render_frame *frame);
+void render_shadow_bind_nearest(const struct render_frame *frame);
 DIPOLE_CHECKED bool render_shadow_draw_map(const struct render_frame *frame, dipole_status *status);
 DIPOLE_CHECKED bool render_shadow_make_curves(const struct render_frame *frame, dipole_status *status);
 DIPOLE_CHECKED bool render_shadow_mark_colour(const struct render_frame *frame, dipole_status *status);
 DIPOLE_CHECKED bool render_shadow_find_nearest(const struct render_frame *frame, dipole_status *status);
 DIPOLE_CHECKED bool render_shadow_fill_taps(const struct render_frame *frame, dipole_status *status);
 
-/* Uniforms of common/shadow.glsl; does nothing for a plan without such shadows. */
-void render_set_shadow(const struct render_frame *frame);
-
-/* Place of tap index of count in the disc of radius 1. */
-void render_shadow_tap(int index, int count, double place[2]);
+/* Uniforms of common/shadow.glsl; does nothing for a plan without such shadows. What is shaded are pixels
+ * of a view that is width_px wide. */
+void render_set_shadow(const struct render_frame *frame, const struct render_projection *seen,
+                       double width_px);
 
 #endif

@@ -1,5 +1,6 @@
 #include "renderer/solid.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -133,4 +134,114 @@ bool render_mesh_is_solid(const struct io_mesh *mesh, bool *is_solid_out, dipole
     return done ||
            dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
                        "no memory to tell whether %zu triangles bound a solid", mesh->triangle_count);
+}
+
+/* ---- convex -------------------------------------------------------------------------------------- */
+
+#define BULGE_SHARE 1e-4
+
+/* The triangles at each place: of vertex v those from ends[v - 1] to ends[v], of the first at a place. */
+struct neighbours {
+    const struct io_mesh *mesh;
+    const uint32_t *owners;
+    uint32_t *ends, *triangles;
+};
+
+static void list_neighbours(struct neighbours *neighbours)
+{
+    const struct io_mesh *const mesh = neighbours->mesh;
+    uint32_t *const ends = neighbours->ends;
+    for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
+        ends[neighbours->owners[mesh->indices[i]]]++;
+    for (size_t v = 1; v < mesh->vertex_count; v++)
+        ends[v] += ends[v - 1];
+    for (size_t i = 3 * mesh->triangle_count; i-- > 0;)
+        neighbours->triangles[--ends[neighbours->owners[mesh->indices[i]]]] = (uint32_t)(i / 3);
+    /* each end has become a beginning */
+    memmove(ends, ends + 1, (mesh->vertex_count - 1) * sizeof *ends);
+    ends[mesh->vertex_count - 1] = (uint32_t)(3 * mesh->triangle_count);
+}
+
+/* Unit normal, times how far above its plane nothing may be; false where the triangle has no area. */
+static bool plane_of(const struct io_mesh *mesh, size_t triangle, double normal[3], double *limit)
+{
+    const uint32_t *const corners = &mesh->indices[3 * triangle];
+    double sides[2][3], square = 0, longest = 0;
+    for (int i = 0; i < 2; i++) {
+        double length2 = 0;
+        for (size_t k = 0; k < 3; k++) {
+            sides[i][k] = (double)mesh->positions[3 * (size_t)corners[i + 1] + k] -
+                          (double)mesh->positions[3 * (size_t)corners[0] + k];
+            length2 += sides[i][k] * sides[i][k];
+        }
+        longest = fmax(longest, sqrt(length2));
+    }
+    for (int k = 0; k < 3; k++) {
+        const int l = (k + 1) % 3, m = (k + 2) % 3;
+        normal[k] = sides[0][l] * sides[1][m] - sides[0][m] * sides[1][l];
+        square += normal[k] * normal[k];
+    }
+    *limit = BULGE_SHARE * longest * sqrt(square);
+    return square > 0;
+}
+
+static bool bulges(const struct neighbours *neighbours, size_t triangle)
+{
+    const struct io_mesh *const mesh = neighbours->mesh;
+    const uint32_t *const corners = &mesh->indices[3 * triangle];
+    double normal[3], limit;
+    if (!plane_of(mesh, triangle, normal, &limit))
+        return false;
+    for (int i = 0; i < 3; i++) {
+        const uint32_t v = neighbours->owners[corners[i]];
+        for (uint32_t n = v > 0 ? neighbours->ends[v - 1] : 0; n < neighbours->ends[v]; n++) {
+            const uint32_t *const others = &mesh->indices[3 * (size_t)neighbours->triangles[n]];
+            for (int j = 0; j < 3; j++) {
+                double height = 0;
+                for (size_t k = 0; k < 3; k++)
+                    height += normal[k] * ((double)mesh->positions[3 * (size_t)others[j] + k] -
+                                           (double)mesh->positions[3 * (size_t)corners[0] + k]);
+                if (height > limit)
+                    return true;
+            }
+        }
+    }
+    return false;
+}
+
+static bool is_one_part(const struct io_mesh *mesh, const uint32_t *owners, uint32_t *parents)
+{
+    for (size_t v = 0; v < mesh->vertex_count; v++)
+        parents[v] = owners[v];
+    for (size_t i = 0; i < 3 * mesh->triangle_count; i++)
+        connect(parents, owners[mesh->indices[i]], owners[mesh->indices[i - i % 3]]);
+    for (size_t i = 1; i < 3 * mesh->triangle_count; i++) {
+        if (find_root(parents, owners[mesh->indices[i]]) != find_root(parents, owners[mesh->indices[0]]))
+            return false;
+    }
+    return true;
+}
+
+bool render_mesh_is_convex(const struct io_mesh *mesh, bool *is_convex_out, dipole_status *status)
+{
+    uint32_t *const owners = calloc(mesh->vertex_count + 1, sizeof *owners);
+    uint32_t *const parents = calloc(mesh->vertex_count + 1, sizeof *parents);
+    struct neighbours neighbours = { .mesh = mesh, .owners = owners };
+    neighbours.ends = calloc(mesh->vertex_count + 1, sizeof *neighbours.ends);
+    neighbours.triangles = calloc(3 * mesh->triangle_count + 1, sizeof *neighbours.triangles);
+    const bool done = owners && parents && neighbours.ends && neighbours.triangles && weld(mesh, owners);
+    if (done) {
+        bool is_convex = is_one_part(mesh, owners, parents);
+        if (is_convex)
+            list_neighbours(&neighbours);
+        for (size_t t = 0; is_convex && t < mesh->triangle_count; t++)
+            is_convex = !bulges(&neighbours, t);
+        *is_convex_out = is_convex;
+    }
+    free(owners);
+    free(parents);
+    free(neighbours.ends);
+    free(neighbours.triangles);
+    return done || dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                               "no memory to tell whether %zu triangles are convex", mesh->triangle_count);
 }

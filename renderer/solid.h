@@ -13,4 +13,9 @@
 DIPOLE_CHECKED bool render_mesh_is_solid(const struct io_mesh *mesh, bool *is_solid_out,
                                          dipole_status *status);
 
+/* Whether a solid is convex: in one part, and no corner of a triangle is above the plane of a neighbour by
+ * more than 1e-4 of its longest side. Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_mesh_is_convex(const struct io_mesh *mesh, bool *is_convex_out,
+                                          dipole_status *status);
+
 #endif

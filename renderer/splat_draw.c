@@ -114,39 +114,6 @@ static float *read_part(const struct render_frame *frame, const char *texture, G
     return texels;
 }
 
-/* The same, drawn in memory; false: no memory, or none of the texels. */
-static bool draw_picture(const struct render_frame *frame, float **texels_out, float **objects_out,
-                         dipole_status *status)
-{
-    const struct render_plan_view *const view = frame->view;
-    const struct io_scene *const scene = frame->request->scene;
-    const size_t texel_count = (size_t)view->size_px * (size_t)view->size_px;
-    struct render_light_mesh *const meshes = calloc(scene->object_count, sizeof *meshes);
-    float *const texels = malloc(texel_count * 4 * sizeof *texels);
-    float *const objects = frame->plan->has_object_ids ? malloc(texel_count * sizeof *objects) : NULL;
-    const struct render_light_picture picture = { .meshes = meshes,
-                                                  .mesh_count = scene->object_count,
-                                                  .projection = &view->projection,
-                                                  .size_px = view->size_px,
-                                                  .texel_area_mm2 = view->texel_area };
-    for (size_t i = 0; meshes && i < scene->object_count; i++)
-        meshes[i] =
-            (struct render_light_mesh){ .mesh = scene->objects[i].mesh,
-                                        .eta =
-                                            frame->plan->media->media[frame->plan->objects[i].medium].eta,
-                                        .has_hidden_inside = render_executor_hides_inside(frame, i) };
-    if (meshes && texels && (objects || !frame->plan->has_object_ids) &&
-        render_light_picture_draw(&picture, texels, objects, status)) {
-        *texels_out = texels;
-        *objects_out = objects;
-    } else {
-        free(texels);
-        free(objects);
-    }
-    free(meshes);
-    return *texels_out != NULL;
-}
-
 static float *read_view(const struct render_frame *frame, const char *texture, GLenum format,
                         size_t components)
 {
@@ -191,18 +158,61 @@ static struct render_light_target target_of(const struct render_frame *frame, si
     return target;
 }
 
-static bool append_view(enum render_coherence coherence, const struct render_light_target *targets,
+/* Samples of what the view shows, drawn in memory tile by tile. */
+static bool append_drawn(const struct render_frame *frame, const struct render_light_target *targets,
+                         const struct render_light_view *view, dipole_status *status)
+{
+    const struct render_plan *const plan = frame->plan;
+    const struct io_scene *const scene = frame->request->scene;
+    struct render_light_mesh *const meshes = calloc(scene->object_count, sizeof *meshes);
+    if (!meshes)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu objects",
+                           scene->object_count);
+    for (size_t i = 0; i < scene->object_count; i++)
+        meshes[i] =
+            (struct render_light_mesh){ .mesh = scene->objects[i].mesh,
+                                        .eta = plan->media->media[plan->objects[i].medium].eta,
+                                        .has_hidden_inside = render_executor_hides_inside(frame, i) };
+    const struct render_light_picture picture = { .meshes = meshes,
+                                                  .mesh_count = scene->object_count,
+                                                  .projection = &frame->view->projection,
+                                                  .size_px = view->size_px,
+                                                  .texel_area = frame->view->texel_area };
+    struct render_light_view drawn = *view;
+    struct render_light_tiles *tiles;
+    drawn.draw_tile = render_light_tiles_draw;
+    drawn.tile_px = render_light_tile_px(view->block_px);
+    drawn.tile_object_count = plan->has_object_ids ? scene->object_count : 0;
+    bool done = render_light_tiles_create(&picture, drawn.tile_px, render_light_view_shift_px(view), &tiles,
+                                          status);
+    if (done) {
+        drawn.tiles = tiles;
+        done = render_light_samples_append(targets, &drawn, status);
+        render_light_tiles_destroy(tiles);
+    }
+    free(meshes);
+    return done;
+}
+
+static bool append_once(const struct render_frame *frame, const struct render_light_target *targets,
+                        const struct render_light_view *view, dipole_status *status)
+{
+    return frame->plan->has_light_pictures ? append_drawn(frame, targets, view, status)
+                                           : render_light_samples_append(targets, view, status);
+}
+
+static bool append_view(const struct render_frame *frame, const struct render_light_target *targets,
                         struct render_light_view *view, dipole_status *status)
 {
-    if (coherence == RENDER_COHERENCE_SURFACE)
+    if (frame->plan->coherence == RENDER_COHERENCE_SURFACE)
         return render_cell_samples_append(targets, view, status);
-    if (coherence != RENDER_COHERENCE_TWO_PASS)
-        return render_light_samples_append(targets, view, status);
+    if (frame->plan->coherence != RENDER_COHERENCE_TWO_PASS)
+        return append_once(frame, targets, view, status);
     view->flux_factor = 0.5;
-    if (!render_light_samples_append(targets, view, status))
+    if (!append_once(frame, targets, view, status))
         return false;
     view->is_shifted = true;
-    return render_light_samples_append(targets, view, status);
+    return append_once(frame, targets, view, status);
 }
 
 bool render_splatter_sample_view(struct render_splatter *splatter, const struct render_frame *frame,
@@ -212,13 +222,9 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     const struct render_plan_view *const view = frame->view;
     const size_t object_count = frame->request->scene->object_count;
     struct render_light_target *const targets = calloc(object_count, sizeof *targets);
-    float *texels = NULL, *objects = NULL;
-    if (!plan->has_light_pictures) {
-        texels = read_view(frame, "light_view", GL_RGBA, 4);
-        objects = plan->has_object_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
-    } else if (!draw_picture(frame, &texels, &objects, status)) {
-        texels = objects = NULL;
-    }
+    const bool is_read = !plan->has_light_pictures, has_ids = plan->has_object_ids;
+    float *const texels = is_read ? read_view(frame, "light_view", GL_RGBA, 4) : NULL;
+    float *const objects = is_read && has_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
     const bool is_counted = plan->area == RENDER_AREA_OVERLAP;
     float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
     const bool is_fixed = plan->coherence == RENDER_COHERENCE_SURFACE;
@@ -227,7 +233,7 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
     const int block_px = render_plan_shadow_block_px(plan),
               side_px = (view->size_px + block_px - 1) / block_px;
     float *const shadows = is_shadowed ? read_part(frame, "light_shadow", side_px, GL_RGBA, 4) : NULL;
-    bool done = targets && texels && (objects || !plan->has_object_ids) && (irradiance || !is_counted) &&
+    bool done = targets && (!is_read || (texels && (objects || !has_ids))) && (irradiance || !is_counted) &&
                 (rest_mm || !is_fixed) && (shadows || !is_shadowed);
     if (done) {
         struct render_light_view reduced = { .texels = texels,
@@ -237,12 +243,14 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
                                              .shadow_block_px = block_px,
                                              .shadow_side_px = side_px,
                                              .size_px = view->size_px,
-                                             .levels = view->levels };
-        if (shadows)
+                                             .block_px = view->block_px };
+        if (texels && shadows)
             take_shadows(texels, irradiance, shadows, &reduced);
         if (plan->shadows.coloured_count > 0)
             reduced.shadows = shadows;
         memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
+        reduced.eye_depth_mm = render_dot(view->projection.eye_mm, view->projection.forward);
+        reduced.texel = view->projection.is_orthographic ? 0 : sqrt(view->texel_area);
         memcpy(reduced.rgb, frame->request->scene->lights[view->light].rgb, sizeof reduced.rgb);
         for (size_t i = 0; i < object_count; i++) {
             const struct render_plan_object *const object = &plan->objects[i];
@@ -250,12 +258,12 @@ bool render_splatter_sample_view(struct render_splatter *splatter, const struct 
                 targets[i] = target_of(frame, i, &splatter->of_medium[object->medium].bands[0]);
         }
         /* Without ids all are alike, but some may be out of sight. */
-        for (size_t i = 1; !objects && i < object_count; i++) {
+        for (size_t i = 1; !has_ids && i < object_count; i++) {
             if (targets[i].samples &&
                 (!targets[0].samples || targets[i].spacing_mm < targets[0].spacing_mm))
                 targets[0] = targets[i];
         }
-        done = append_view(plan->coherence, targets, &reduced, status);
+        done = append_view(frame, targets, &reduced, status);
     } else {
         dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a light's view of %d texels a side",
                     view->size_px);

@@ -37,7 +37,7 @@ struct photon {
  */
 
 /* Start a photon just below the surface; false: all of it was mirrored. */
-static bool enter(const struct trace *trace, struct tracer_stream *stream, struct photon *photon,
+static bool enter(const struct trace *trace, struct accuracy_stream *stream, struct photon *photon,
                   struct tracer_powers *powers)
 {
     struct tracer_arrival arrival;
@@ -60,7 +60,7 @@ static bool enter(const struct trace *trace, struct tracer_stream *stream, struc
     return photon->power_w > 0;
 }
 
-static void scatter(double g, double direction[3], struct tracer_stream *stream)
+static void scatter(double g, double direction[3], struct accuracy_stream *stream)
 {
     double point[2];
     const double r2 = tracer_disc(stream, point);
@@ -97,14 +97,14 @@ static void count_rings(const struct trace *trace, const struct photon *photon, 
 }
 
 /* At the surface: false if the photon left. */
-static bool reflect(const struct trace *trace, int face, struct tracer_stream *stream,
+static bool reflect(const struct trace *trace, int face, struct accuracy_stream *stream,
                     struct photon *photon, double *row)
 {
     double normal[3], outward[3];
     tracer_normal(&trace->shape, photon->p_mm, face, normal);
     const double eta = trace->scene->medium.eta;
     const double cosine = fmin(fmax(tracer_dot(photon->direction, normal), 0), 1);
-    if (tracer_uniform(stream) <= dipole_fresnel_reflectance(1 / eta, cosine)) {
+    if (accuracy_uniform(stream) <= dipole_fresnel_reflectance(1 / eta, cosine)) {
         for (int k = 0; k < 3; k++)
             photon->direction[k] -= 2 * cosine * normal[k];
         return true;
@@ -124,7 +124,7 @@ static bool reflect(const struct trace *trace, int face, struct tracer_stream *s
 }
 
 /* At a place within: false if roulette ended the photon. */
-static bool interact(const struct trace *trace, double albedo, struct tracer_stream *stream,
+static bool interact(const struct trace *trace, double albedo, struct accuracy_stream *stream,
                      struct photon *photon, double *row)
 {
     struct tracer_powers *const powers = (struct tracer_powers *)row;
@@ -133,7 +133,7 @@ static bool interact(const struct trace *trace, double albedo, struct tracer_str
     photon->power_w *= albedo;
     if (photon->power_w < ROULETTE * photon->start_w) {
         const double before_w = photon->power_w;
-        const bool survives = before_w > 0 && tracer_uniform(stream) <= ROULETTE;
+        const bool survives = before_w > 0 && accuracy_uniform(stream) <= ROULETTE;
         photon->power_w = survives ? before_w / ROULETTE : 0;
         powers->roulette += before_w - photon->power_w;
         if (!survives)
@@ -147,7 +147,7 @@ static bool interact(const struct trace *trace, double albedo, struct tracer_str
     return true;
 }
 
-static void trace_photon(const struct trace *trace, struct tracer_stream *stream, double *row)
+static void trace_photon(const struct trace *trace, struct accuracy_stream *stream, double *row)
 {
     const struct tracer_medium *const medium = &trace->scene->medium;
     const double sigma_t = medium->sigma_a_per_mm + medium->sigma_s_per_mm;
@@ -158,7 +158,7 @@ static void trace_photon(const struct trace *trace, struct tracer_stream *stream
     while (is_alive) {
         int face = 0;
         const double surface_mm = tracer_distance_mm(shape, photon.p_mm, photon.direction, &face);
-        const double free_mm = sigma_t > 0 ? -log(tracer_uniform(stream)) / sigma_t : INFINITY;
+        const double free_mm = sigma_t > 0 ? -log(accuracy_uniform(stream)) / sigma_t : INFINITY;
         const bool is_at_surface = free_mm >= surface_mm;
         const double step_mm = is_at_surface ? surface_mm : free_mm;
         for (int k = 0; k < 3; k++)
@@ -173,15 +173,7 @@ static void trace_photon(const struct trace *trace, struct tracer_stream *stream
 static void trace_batch(void *context, int batch)
 {
     const struct trace *const trace = context;
-    /* SplitMix64 fills the state, as its authors advise. */
-    uint64_t mix = trace->seed + (uint64_t)batch * 0xd1342543de82ef95u;
-    struct tracer_stream stream;
-    for (int i = 0; i < 4; i++) {
-        uint64_t z = mix += 0x9e3779b97f4a7c15u;
-        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-        z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-        stream.s[i] = z ^ (z >> 31);
-    }
+    struct accuracy_stream stream = accuracy_stream_of(trace->seed, (uint64_t)batch);
     double *const row = trace->rows + (size_t)batch * trace->row_length;
     for (size_t i = 0; i < trace->photons_per_batch; i++)
         trace_photon(trace, &stream, row);
@@ -191,16 +183,9 @@ static void trace_batch(void *context, int batch)
 
 static void gather(const struct trace *trace, size_t column, double *mean, double *error)
 {
-    double sum = 0, deviation2 = 0;
-    for (size_t batch = 0; batch < TRACER_BATCHES; batch++)
-        sum += trace->rows[batch * trace->row_length + column];
-    const double middle = sum / TRACER_BATCHES, scale = 1 / (double)trace->photons_per_batch;
-    for (size_t batch = 0; batch < TRACER_BATCHES; batch++) {
-        const double d = trace->rows[batch * trace->row_length + column] - middle;
-        deviation2 += d * d;
-    }
-    *mean = middle * scale;
-    *error = sqrt(deviation2 / (TRACER_BATCHES * (TRACER_BATCHES - 1))) * scale;
+    accuracy_judge(trace->rows + column, TRACER_BATCHES, trace->row_length, mean, error);
+    *mean /= (double)trace->photons_per_batch;
+    *error /= (double)trace->photons_per_batch;
 }
 
 static void gather_all(const struct trace *trace, struct tracer_result *result)

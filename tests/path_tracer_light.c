@@ -5,11 +5,11 @@
 
 /* ---- random directions ------------------------------------------------------------------------------ */
 
-double tracer_disc(struct tracer_stream *stream, double point[2])
+double tracer_disc(struct accuracy_stream *stream, double point[2])
 {
     for (;;) {
-        point[0] = 2 * tracer_uniform(stream) - 1;
-        point[1] = 2 * tracer_uniform(stream) - 1;
+        point[0] = 2 * accuracy_uniform(stream) - 1;
+        point[1] = 2 * accuracy_uniform(stream) - 1;
         const double r2 = point[0] * point[0] + point[1] * point[1];
         if (r2 < 1 && r2 > 0)
             return r2;
@@ -86,7 +86,7 @@ bool tracer_meet(const struct tracer_shape *shape, const double from_mm[3], cons
 
 /* A point on one of the faces that see the light. */
 static void sample_box(const struct tracer_lamp *lamp, const struct tracer_shape *shape,
-                       struct tracer_stream *stream, struct tracer_arrival *out)
+                       struct accuracy_stream *stream, struct tracer_arrival *out)
 {
     const struct tracer_light *const light = &lamp->light;
     const double *const planes = shape->planes_mm;
@@ -102,7 +102,7 @@ static void sample_box(const struct tracer_lamp *lamp, const struct tracer_shape
             weights[face] = sign * (light->position_mm[axis] - planes[face]) > 0 ? area_mm2 : 0;
         total += weights[face];
     }
-    double left = total * tracer_uniform(stream);
+    double left = total * accuracy_uniform(stream);
     for (int face = 0; face < TRACER_FACES; face++) {
         if (weights[face] > 0) {
             out->face = face;
@@ -112,7 +112,7 @@ static void sample_box(const struct tracer_lamp *lamp, const struct tracer_shape
         }
     }
     for (int k = 0; k < 3; k++)
-        out->p_mm[k] = planes[2 * k] + (planes[2 * k + 1] - planes[2 * k]) * tracer_uniform(stream);
+        out->p_mm[k] = planes[2 * k] + (planes[2 * k + 1] - planes[2 * k]) * accuracy_uniform(stream);
     out->p_mm[out->face / 2] = planes[out->face];
     out->power_w = light->strength * total;
     memcpy(out->direction, light->direction, sizeof out->direction);
@@ -129,7 +129,7 @@ static void sample_box(const struct tracer_lamp *lamp, const struct tracer_shape
 /* Directional: a point of the disc that the sphere shows the light. Point: a direction in the cone that
  * holds the sphere. */
 static void sample_sphere(const struct tracer_lamp *lamp, const struct tracer_shape *shape,
-                          struct tracer_stream *stream, struct tracer_arrival *out)
+                          struct accuracy_stream *stream, struct tracer_arrival *out)
 {
     const struct tracer_light *const light = &lamp->light;
     const double radius_mm = shape->radius_mm, *const centre_mm = shape->centre_mm;
@@ -165,7 +165,7 @@ static void sample_sphere(const struct tracer_lamp *lamp, const struct tracer_sh
 }
 
 void tracer_lamp_sample(const struct tracer_lamp *lamp, const struct tracer_shape *shape,
-                        struct tracer_stream *stream, struct tracer_arrival *out)
+                        struct accuracy_stream *stream, struct tracer_arrival *out)
 {
     const struct tracer_light *const light = &lamp->light;
     if (light->kind == TRACER_PENCIL) {

@@ -2,6 +2,7 @@
 #ifndef PATH_TRACER_PARTS_H
 #define PATH_TRACER_PARTS_H
 
+#include "accuracy/batches.h"
 #include "path_tracer.h"
 
 #include <math.h>
@@ -13,35 +14,11 @@ static inline double tracer_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* ---- random numbers: xoshiro256++ of Blackman and Vigna ------------------------------------------- */
-
-struct tracer_stream {
-    uint64_t s[4];
-};
-
-static inline uint64_t tracer_bits(struct tracer_stream *stream)
-{
-    uint64_t *const s = stream->s;
-    const uint64_t sum = s[0] + s[3];
-    const uint64_t result = ((sum << 23) | (sum >> 41)) + s[0], t = s[1] << 17;
-    s[2] ^= s[0];
-    s[3] ^= s[1];
-    s[1] ^= s[2];
-    s[0] ^= s[3];
-    s[2] ^= t;
-    s[3] = (s[3] << 45) | (s[3] >> 19);
-    return result;
-}
-
-/* 0 < value <= 1: its logarithm is finite. */
-static inline double tracer_uniform(struct tracer_stream *stream)
-{
-    return (double)((tracer_bits(stream) >> 11) + 1) * 0x1p-53;
-}
+/* ---- random numbers ------------------------------------------------------------------------------- */
 
 /* A point in the unit disc, uniform; returns its distance from the middle, squared, above 0. That is
  * uniform, too, and independent of the angle. */
-double tracer_disc(struct tracer_stream *stream, double point[2]);
+double tracer_disc(struct accuracy_stream *stream, double point[2]);
 
 /* A direction with this cosine to the axis, at the angle about it of a point in the disc. */
 void tracer_turn(const double axis[3], double cosine, const double point[2], double r2, double out[3]);
@@ -106,7 +83,7 @@ struct tracer_arrival {
 
 void tracer_lamp_init(const struct tracer_light *light, struct tracer_lamp *out);
 void tracer_lamp_sample(const struct tracer_lamp *lamp, const struct tracer_shape *shape,
-                        struct tracer_stream *stream, struct tracer_arrival *out);
+                        struct accuracy_stream *stream, struct tracer_arrival *out);
 
 /* Where a ray from outside first meets the body; false: it does not. */
 bool tracer_meet(const struct tracer_shape *shape, const double from_mm[3], const double direction[3],
@@ -149,7 +126,7 @@ double tracer_phase_per_sr(double g, double cosine);
 /* Join a scattering at p_mm to the eye: light came along direction, power_w leaves it. */
 void tracer_camera_connect(const struct tracer_camera *camera, const struct tracer_shape *shape,
                            const struct tracer_medium *medium, const double p_mm[3],
-                           const double direction[3], double power_w, struct tracer_stream *stream,
+                           const double direction[3], double power_w, struct accuracy_stream *stream,
                            double *picture);
 
 /*

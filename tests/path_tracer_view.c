@@ -111,7 +111,7 @@ struct event {
  * mirrored and goes on, until little is left and roulette ends it.
  */
 static void follow(const struct event *event, const struct tracer_connection *connection,
-                   const double direction[3], double power_w_per_sr, struct tracer_stream *stream)
+                   const double direction[3], double power_w_per_sr, struct accuracy_stream *stream)
 {
     double p[3], d[3], depth = 0, left = 1;
     memcpy(p, event->p_mm, sizeof p);
@@ -137,7 +137,7 @@ static void follow(const struct event *event, const struct tracer_connection *co
         left *= connection->reflected[axis];
         d[axis] = -d[axis];
         if (left < 0.05) {
-            if (tracer_uniform(stream) * 0.05 > left || left == 0)
+            if (accuracy_uniform(stream) * 0.05 > left || left == 0)
                 return;
             left = 0.05;
         }
@@ -146,12 +146,12 @@ static void follow(const struct event *event, const struct tracer_connection *co
 
 void tracer_camera_connect(const struct tracer_camera *camera, const struct tracer_shape *shape,
                            const struct tracer_medium *medium, const double p_mm[3],
-                           const double direction[3], double power_w, struct tracer_stream *stream,
+                           const double direction[3], double power_w, struct accuracy_stream *stream,
                            double *picture)
 {
     struct event event = { .camera = camera, .shape = shape, .p_mm = p_mm };
     event.sigma_t_per_mm = medium->sigma_a_per_mm + medium->sigma_s_per_mm;
-    event.depth_limit = DEPTH_COMPUTED - log(tracer_uniform(stream));
+    event.depth_limit = DEPTH_COMPUTED - log(accuracy_uniform(stream));
     event.picture = picture;
     double nearest_mm = INFINITY; /* no way is shorter */
     for (int face = 0; face < TRACER_FACES; face++)

@@ -14,11 +14,10 @@ struct test_profile {
     double spacing_mm, r_max_mm; /* at epsilon */
 };
 
-static inline void profile_init(struct test_profile *profile, const char *name, dipole_model model,
-                                double epsilon)
+static inline void profile_init_of(struct test_profile *profile, const struct io_material *material,
+                                   double epsilon)
 {
-    *profile = (struct test_profile){ .material = read_bundled(name, 1) };
-    profile->material.model = model;
+    *profile = (struct test_profile){ .material = *material };
     profile->medium = (struct render_medium){ .material = &profile->material, .has_scattering = true };
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         profile->medium.stacks[c] = stack_of(&profile->material, c);
@@ -32,6 +31,14 @@ static inline void profile_init(struct test_profile *profile, const char *name, 
     profile->source = (struct render_band_source){ .table = profile->table, .medium = &profile->medium };
     profile->spacing_mm = render_medium_spacing_mm(&profile->medium, 0.58 * epsilon);
     profile->r_max_mm = render_medium_r_max_mm(&profile->medium, 0.02 * epsilon);
+}
+
+static inline void profile_init(struct test_profile *profile, const char *name, dipole_model model,
+                                double epsilon)
+{
+    struct io_material material = read_bundled(name, 1);
+    material.model = model;
+    profile_init_of(profile, &material, epsilon);
 }
 
 static inline void profile_end(struct test_profile *profile)

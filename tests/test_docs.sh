@@ -10,7 +10,7 @@ rm -rf "$work"
 mkdir -p "$work"
 cd "$source_folder"
 
-for number in $(grep -rhoE 'theory\.md (\(?T[0-9]+[, to]*)+|[( ]T[0-9]+[.,:)]' libdipole io lutgen renderer fit dipole plot |
+for number in $(grep -rhoE 'theory\.md (\(?T[0-9]+[, to]*)+|[( ]T[0-9]+[.,:)]' libdipole io lutgen renderer fit accuracy dipole plot |
     grep -oE 'T[0-9]+' | sort -u); do
     grep -q "\*\*$number\." docs/theory.md ||
         { echo "[  FAILED  ] $number is cited in the code and not in docs/theory.md"; exit 1; }

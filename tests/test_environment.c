@@ -6,6 +6,7 @@
 
 #include "io/image.h"
 #include "renderer/environment_samples.h"
+#include "renderer/projection.h"
 #include "renderer/reference_environment.h"
 
 #include <unistd.h>
@@ -115,6 +116,52 @@ static void maps_have_the_harmonics_of_closed_forms(void **state)
         }
     }
     render_environment_destroy(environment);
+    free(unit);
+}
+
+/* Oracle: Gauss's rule on each pixel of small maps of noise, of any height, odd ones too, turned: to its
+ * error for functions of degree 8, 1e-9. */
+static void small_maps_have_the_harmonics_of_their_pixels(void **state)
+{
+    (void)state;
+    enum { POINTS = 24, DEGREE = 8 };
+    static const int heights[] = { 1, 2, 3, 5, 6 };
+    struct rng rng = { .seed = 8 };
+    double(*const unit)[3] = calloc(RENDER_HARMONIC_COUNT, sizeof *unit);
+    double points[POINTS], weights[POINTS];
+    assert_non_null(unit);
+    render_legendre_rule(POINTS, points, weights);
+    for (size_t h = 0; h < sizeof heights / sizeof *heights; h++) {
+        struct io_image *image;
+        assert_true(io_image_create(2 * heights[h], heights[h], 3, &image, NULL));
+        for (int i = 0; i < 6 * heights[h] * heights[h]; i++)
+            image->pixels[i] = (float)uniform(&rng, 0, 1);
+        struct render_environment *const environment = environment_of(image, uniform(&rng, -4, 4));
+        const double side_rad = PI / heights[h];
+        for (int k = 0; k < 6; k++) {
+            const int l = k < 2 ? k : (int)uniform(&rng, 0, DEGREE + 0.999);
+            const int index = l * l + (int)uniform(&rng, 0, 2 * l + 0.999);
+            double expected[3] = { 0 };
+            unit[index][0] = 1;
+            for (int i = 0; i < 2 * heights[h] * heights[h] * POINTS * POINTS; i++) {
+                const int pixel = i / (POINTS * POINTS), a = i / POINTS % POINTS, b = i % POINTS;
+                const double x = pixel % (2 * heights[h]) + 0.5 * (1 + points[a]);
+                const double y = pixel / (2 * heights[h]) + 0.5 * (1 + points[b]);
+                double direction[3], value[3];
+                render_environment_direction(environment, x, y, direction);
+                render_harmonics_sum(&environment->harmonics, DEGREE, (const double(*)[3])unit, direction,
+                                     value);
+                for (int c = 0; c < 3; c++)
+                    expected[c] += 0.25 * weights[a] * weights[b] * side_rad * side_rad *
+                                   sin(side_rad * y) * value[0] * (double)image->pixels[3 * pixel + c];
+            }
+            unit[index][0] = 0;
+            for (int c = 0; c < 3; c++)
+                assert_true(fabs(environment->coefficients[index][c] - expected[c]) < 1e-9);
+        }
+        render_environment_destroy(environment);
+        io_image_destroy(image);
+    }
     free(unit);
 }
 
@@ -238,6 +285,83 @@ static void harmonics_keep_to_their_error(void **state)
     }
 }
 
+/* A sky of 1 but for one pixel. */
+static struct render_environment *hot_sky(int height_px, float hot)
+{
+    struct io_image *image;
+    assert_true(io_image_create(2 * height_px, height_px, 1, &image, NULL));
+    for (int i = 0; i < 2 * height_px * height_px; i++)
+        image->pixels[i] = 1;
+    image->pixels[2 * height_px * (height_px / 3) + height_px / 2] = hot;
+    struct render_environment *const environment = environment_of(image, 0);
+    io_image_destroy(image);
+    return environment;
+}
+
+/* Oracle: closed form, a sky of 1 and a lamp of no size: one pixel a million times as bright, which is
+ * nearly all of the light. Its harmonics do not fall, and still E errs by no more than is asked at some
+ * order, as the bound of all higher ones says; it is nowhere below 0, and dark where the lamp has set. */
+static void a_hot_pixel_does_not_ring(void **state)
+{
+    (void)state;
+    enum { HEIGHT = 256, ROW = HEIGHT / 3 };
+    const double epsilon = 1e-3, eta = 1.5;
+    const double sr = PI / HEIGHT * (cos(PI * ROW / HEIGHT) - cos(PI * (ROW + 1) / HEIGHT));
+    struct rng rng = { .seed = 6 };
+    struct render_environment *const environment = hot_sky(HEIGHT, 1e6F);
+    struct render_irradiance *const irradiance = irradiance_of(environment, eta, epsilon);
+    double error2 = 0, lamp[3];
+    assert_true(irradiance->order < RENDER_HARMONIC_LIMIT && irradiance->error <= epsilon);
+    render_environment_direction(environment, HEIGHT / 2 + 0.5, ROW + 0.5, lamp);
+    for (int i = 0; i < 2000; i++) {
+        double normal[3], rgb[3];
+        random_direction(&rng, normal);
+        const double mu = render_dot(normal, lamp);
+        const double transmitted = mu > 0 ? 1 - dipole_fresnel_reflectance(eta, mu) : 0;
+        const double expected = PI * dipole_fdt_outside(eta) + (1e6 - 1) * sr * transmitted * fmax(mu, 0);
+        render_irradiance_at(irradiance, normal, rgb);
+        const double error = (rgb[1] - expected) / irradiance->mean[1];
+        error2 += error * error / 2000;
+        assert_true(rgb[1] >= 0);
+        assert_true(fabs(error) < (mu < -0.1 ? 3 : 10) * epsilon);
+    }
+    assert_true(sqrt(error2) < 1.3 * epsilon); /* 2000 normals, and a pixel that is 0.7 degrees wide */
+    render_irradiance_destroy(irradiance);
+    render_environment_destroy(environment);
+}
+
+/* Oracle: by hand. The largest map there may be and the smallest. One in a thousand of the first's light is
+ * in one pixel; of two pixels, the halves of the sky left and right, both light what faces up alike. */
+static void maps_may_be_large_and_small(void **state)
+{
+    (void)state;
+    enum { HEIGHT = RENDER_ENVIRONMENT_SIDE_LIMIT / 2, ROW = HEIGHT / 3 };
+    const double sr = 2 * PI / (2 * HEIGHT) * (cos(PI * ROW / HEIGHT) - cos(PI * (ROW + 1) / HEIGHT));
+    struct render_environment *environment = hot_sky(HEIGHT, (float)(1e-3 * 4 * PI / sr));
+    assert_close(environment->mean[0], 1 + 1e-3, 1e-6, "mean"); /* of floats */
+    struct render_irradiance *irradiance = irradiance_of(environment, 1.3, 1e-3);
+    assert_true(irradiance->order > 0 && irradiance->order < RENDER_HARMONIC_LIMIT);
+    render_irradiance_destroy(irradiance);
+    render_environment_destroy(environment);
+
+    struct io_image *image;
+    double rgb[3], left[3], right[3];
+    assert_true(io_image_create(2, 1, 1, &image, NULL));
+    image->pixels[0] = 1;
+    image->pixels[1] = 3;
+    environment = environment_of(image, 0);
+    irradiance = irradiance_of(environment, 1.3, 1e-3);
+    render_irradiance_at(irradiance, (const double[3]){ 0, 1, 0 }, rgb);
+    render_irradiance_at(irradiance, (const double[3]){ 1, 0, 0 }, left);
+    render_irradiance_at(irradiance, (const double[3]){ -1, 0, 0 }, right);
+    assert_close(rgb[0], 2 * PI * dipole_fdt_outside(1.3), 1e-6, "above");
+    assert_close(left[0], PI * dipole_fdt_outside(1.3), 2e-2, "left"); /* +x, where the map is 1 */
+    assert_close(right[0], 3 * PI * dipole_fdt_outside(1.3), 2e-2, "right");
+    render_irradiance_destroy(irradiance);
+    render_environment_destroy(environment);
+    io_image_destroy(image);
+}
+
 /* Oracle: turning the map about y turns E with it; to rounding. */
 static void irradiance_turns_with_the_map(void **state)
 {
@@ -276,11 +400,14 @@ static struct render_light_samples sample_mesh(const struct render_irradiance *i
 {
     const double min_mm[3] = { (double)mesh->min[0], (double)mesh->min[1], (double)mesh->min[2] };
     struct render_light_samples samples = { 0 };
+    struct render_irradiance_table *table;
     struct render_patches *patches;
-    assert_true(render_patches_create(irradiance, min_mm, spacing_mm, &patches, NULL) &&
+    assert_true(render_irradiance_table_create(irradiance, 1e-6, &table, NULL));
+    assert_true(render_patches_create(table, min_mm, spacing_mm, &patches, NULL) &&
                 render_patches_add_mesh(patches, mesh, NULL) &&
                 render_patches_finish(patches, 0, visibility, &samples, NULL));
     render_patches_destroy(patches);
+    render_irradiance_table_destroy(table);
     return samples;
 }
 
@@ -423,6 +550,11 @@ static void bad_maps_are_refused(void **state)
     expect_refused("nan.exr", "the map holds nan in pixel (0, 0), expected finite radiance");
     write_map("infinite.exr", 8, 4, 1, INFINITY);
     expect_refused("infinite.exr", "the map holds inf in pixel (0, 0), expected finite radiance");
+    write_map("minus.exr", 8, 4, 1, -INFINITY);
+    expect_refused("minus.exr", "the map holds -inf in pixel (0, 0), expected finite radiance");
+    write_map("bright.exr", 8, 4, 1, 1e31F);
+    expect_refused("bright.exr",
+                   "the map's radiance, scaled, is 1e+31 in pixel (0, 0), expected at most 1e+30");
     write_map("negative.exr", 8, 4, 1, -100);
     expect_refused("negative.exr", "of the map's light is negative, expected at most 0.01");
     assert_int_equal(truncate("nan.exr", 150), 0);
@@ -458,9 +590,12 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(harmonics_are_orthonormal),
         cmocka_unit_test(maps_have_the_harmonics_of_closed_forms),
+        cmocka_unit_test(small_maps_have_the_harmonics_of_their_pixels),
         cmocka_unit_test(zonal_coefficients_are_exact),
         cmocka_unit_test(a_constant_map_needs_order_0),
         cmocka_unit_test(harmonics_keep_to_their_error),
+        cmocka_unit_test(a_hot_pixel_does_not_ring),
+        cmocka_unit_test(maps_may_be_large_and_small),
         cmocka_unit_test(irradiance_turns_with_the_map),
         cmocka_unit_test(samples_carry_all_flux),
         cmocka_unit_test(rays_see_what_is_not_hidden),

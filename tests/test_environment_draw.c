@@ -263,6 +263,26 @@ static void plans_take_what_is_asked(void **state)
     }
 }
 
+/* Oracle: by hand. A black map lights nothing and is said to be black; nothing else does then. */
+static void a_black_map_is_none(void **state)
+{
+    (void)state;
+    const struct io_material material = skin1();
+    const double level = 0;
+    struct render_environment *const black = sky_of(4, constant_sky, &level);
+    struct test_scene test;
+    init(&test, IO_PRIMITIVE_SPHERE, &material, "sky");
+    const struct render_request request = { .scene = &test.scene, .epsilon = 0.01, .environment = black };
+    struct render_plan *const plan = plan_for(&request);
+    assert_false(decision_of(plan, "environment")->is_active);
+    assert_string_equal(decision_of(plan, "environment")->reason, "it is black");
+    assert_false(decision_of(plan, "environment_samples")->is_active);
+    assert_string_equal(render_plan_dark_reason(plan), "no light shines");
+    render_plan_destroy(plan);
+    render_environment_destroy(black);
+    scene_end(&test);
+}
+
 /* Oracle: the smaller epsilon, the higher the order, and what is left out keeps to a tenth of epsilon;
  * a sky with a sun needs more than soft boxes; a uniform sky 0. */
 static void orders_follow_epsilon_and_the_map(void **state)
@@ -300,6 +320,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lights_add_up_beside_it),
         cmocka_unit_test(plans_take_what_is_asked),
+        cmocka_unit_test(a_black_map_is_none),
         cmocka_unit_test(orders_follow_epsilon_and_the_map),
         cmocka_unit_test(lambert_shows_the_irradiance),
         cmocka_unit_test(splats_agree_with_the_reference),

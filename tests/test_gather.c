@@ -274,6 +274,49 @@ static void loops_agree(void **state)
     profile_end(&profile);
 }
 
+/* Oracle: the sums channel by channel, to the last bit, where channels scatter alike; others are no grey.
+ */
+static void grey_is_summed_once(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 4 };
+    for (int is_grey = 0; is_grey <= 1; is_grey++) {
+        struct io_material material = read_bundled("skin1", 1);
+        struct test_profile profile;
+        struct render_band bands[RENDER_BAND_LIMIT];
+        struct render_split split;
+        struct render_gather_kernel kernel;
+        for (int c = 1; c < IO_CHANNEL_COUNT && is_grey; c++)
+            memcpy(material.layers[c], material.layers[0], sizeof material.layers[0]);
+        profile_init_of(&profile, &material, 0.01);
+        const int count = render_bands_make(profile.spacing_mm, profile.r_max_mm, 2, bands);
+        assert_true(render_split_init(&profile.source, bands, count, &split, NULL));
+        render_gather_kernel_init(&split, 1, &kernel);
+        assert_int_equal(kernel.is_grey, is_grey);
+        struct render_gather_source source = { .flux_w = { 1, 0.2f, 3 } };
+        struct render_gather_places places = { .sums = { { 0 } } };
+        const struct render_gather_source *const list[1] = { &source };
+        for (int k = 0; k < 6; k++)
+            source.spread_mm2[k] = (float)uniform(&rng, 0, 0.1);
+        for (int k = 0; k < 3; k++) {
+            for (int i = 0; i < RENDER_GATHER_LANES; i++)
+                places.position_mm[k][i] = (float)uniform(&rng, 0, 0.5 * bands[1].r_outer_mm);
+        }
+        struct render_gather_places once = places, with_slopes = places, once_with = places;
+        render_gather_loops_best()->sum(&kernel, list, 1, &once);
+        render_gather_loops_best()->sum_with_slopes(&kernel, list, 1, &once_with);
+        kernel.is_grey = false;
+        render_gather_loops_best()->sum(&kernel, list, 1, &places);
+        render_gather_loops_best()->sum_with_slopes(&kernel, list, 1, &with_slopes);
+        assert_memory_equal(once.sums, places.sums, sizeof places.sums);
+        assert_memory_equal(once_with.sums, with_slopes.sums, sizeof places.sums);
+        assert_memory_equal(once_with.slopes, with_slopes.slopes, sizeof places.slopes);
+        assert_true(places.sums[1][0] > 0);
+        render_split_end(&split);
+        profile_end(&profile);
+    }
+}
+
 /* Oracle: differences of the sums of a source that is spread the same in a plane, which is all that slopes
  * know, at places of the plane. Second derivatives of piecewise cubics jump by a few per cent of the slope.
  */
@@ -648,6 +691,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kernels_follow_the_bands),
+        cmocka_unit_test(grey_is_summed_once),
         cmocka_unit_test(loops_agree),
         cmocka_unit_test(slopes_are_differences),
         cmocka_unit_test(merging_keeps_moments),

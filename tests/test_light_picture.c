@@ -1,7 +1,9 @@
-/* renderer/light_picture.c: triangles that parallel light sees, drawn in memory. */
-#include "check.h"
+/* renderer/light_picture.c, light_clip.c: triangles that a light sees, drawn in memory. */
+#include "drawing.h"
 
+#include "renderer/frusta.h"
 #include "renderer/light_picture.h"
+#include "renderer/renderer.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -24,18 +26,68 @@ static struct render_projection view_along(const double forward[3])
     return view;
 }
 
-static void draw(const struct render_light_mesh *meshes, size_t mesh_count,
-                 const struct render_projection *view, int thread_count, float *texels, float *objects)
+/* From the origin, to the faces of a cube about it. */
+static void views_around(const double eye_mm[3], double near_mm, double far_mm,
+                         struct render_projection faces[RENDER_FACES])
+{
+    const struct render_ball ball = { .centre_mm = { eye_mm[0], eye_mm[1], eye_mm[2] },
+                                      .radius_mm = far_mm / 1.001 };
+    assert_int_equal(render_frusta_of_point(eye_mm, &ball, 1, 1, faces), RENDER_FACES);
+    for (int f = 0; f < RENDER_FACES; f++)
+        faces[f].near_mm = near_mm;
+}
+
+static double texel_area_of(const struct render_projection *view, int size_px)
+{
+    return 4 * view->half_width * view->half_height / size_px / size_px;
+}
+
+/* All tiles, put together. */
+static void draw_picture(const struct render_light_picture *picture, int tile_px, int shift_px,
+                         float *texels, float *objects)
+{
+    struct render_light_tiles *tiles;
+    dipole_status status;
+    const int size_px = picture->size_px;
+    float *const tile = malloc((size_t)(5 * tile_px * tile_px) * sizeof *tile), *const ids =
+                                                                                    tile +
+                                                                                    4 * tile_px * tile_px;
+    assert_non_null(tile);
+    if (!render_light_tiles_create(picture, tile_px, shift_px, &tiles, &status))
+        fail_msg("%s", status.message);
+    memset(texels, 0, (size_t)(4 * size_px * size_px) * sizeof *texels);
+    if (objects)
+        memset(objects, 0, (size_t)(size_px * size_px) * sizeof *objects);
+    for (int y = -shift_px; y < size_px; y += tile_px) {
+        for (int x = -shift_px; x < size_px; x += tile_px) {
+            const bool is_drawn = render_light_tiles_draw(tiles, x, y, tile, objects ? ids : NULL);
+            for (int i = 0; is_drawn && i < tile_px * tile_px; i++) {
+                const int at_x = x + i % tile_px, at_y = y + i / tile_px;
+                if (at_x < 0 || at_x >= size_px || at_y < 0 || at_y >= size_px) {
+                    assert_true(tile[4 * i + 3] == 0);
+                    continue;
+                }
+                memcpy(texels + 4 * (at_y * size_px + at_x), tile + 4 * i, 4 * sizeof *texels);
+                if (objects)
+                    objects[at_y * size_px + at_x] = ids[i];
+            }
+        }
+    }
+    render_light_tiles_destroy(tiles);
+    free(tile);
+}
+
+static void draw_meshes(const struct render_light_mesh *meshes, size_t mesh_count,
+                        const struct render_projection *view, int thread_count, float *texels,
+                        float *objects)
 {
     const struct render_light_picture picture = { .meshes = meshes,
                                                   .mesh_count = mesh_count,
                                                   .projection = view,
                                                   .size_px = SIDE,
-                                                  .texel_area_mm2 = TEXEL_MM * TEXEL_MM,
+                                                  .texel_area = texel_area_of(view, SIDE),
                                                   .thread_count = thread_count };
-    dipole_status status;
-    if (!render_light_picture_draw(&picture, texels, objects, &status))
-        fail_msg("%s", status.message);
+    draw_picture(&picture, 8 * thread_count + 5, thread_count, texels, objects);
 }
 
 static void random_direction(struct rng *rng, double direction[3])
@@ -83,93 +135,148 @@ static void fill_soup(struct rng *rng, struct soup *soup)
                                    .indices = soup->indices };
 }
 
-/* The middle of a texel, as weights of a triangle's corners in the view's plane; 0 area: false. */
-static bool weights_at(const struct render_projection *view, const struct soup *soup, int triangle,
-                       const double at_mm[2], double weights[3], double *area_mm2)
+/* What a ray meets first: { x, y, z in mm, power share }, and the number of its mesh; 0: nothing. */
+struct hit {
+    double position_mm[3], share, depth_mm, next_mm;
+    int object, triangle;
+};
+
+/* Weights of a triangle's corners where the ray from + t along meets it (Moeller and Trumbore 1997). */
+static bool meet(const struct soup *soup, int triangle, const double from[3], const double along[3],
+                 double weights[3], double *t, bool *is_front)
 {
-    double corners[3][3];
-    for (int i = 0; i < 3; i++) {
-        const float *const p = &soup->positions[9 * triangle + 3 * i];
-        const double position_mm[3] = { (double)p[0], (double)p[1], (double)p[2] };
-        render_projection_to_view(view, position_mm, corners[i]);
+    double a[3], ab[3], ac[3], p[3], q[3], to_a[3];
+    for (int k = 0; k < 3; k++) {
+        const float *const at = &soup->positions[9 * triangle + k];
+        a[k] = (double)at[0];
+        ab[k] = (double)at[3] - a[k];
+        ac[k] = (double)at[6] - a[k];
+        to_a[k] = from[k] - a[k];
     }
-    double sum = 0;
-    for (int i = 0; i < 3; i++) {
-        const double *const a = corners[(i + 1) % 3], *const b = corners[(i + 2) % 3];
-        weights[i] = (b[0] - a[0]) * (at_mm[1] - a[1]) - (b[1] - a[1]) * (at_mm[0] - a[0]);
-        sum += weights[i];
+    for (int k = 0; k < 3; k++) {
+        const int l = (k + 1) % 3, m = (k + 2) % 3;
+        p[k] = along[l] * ac[m] - along[m] * ac[l];
+        q[k] = to_a[l] * ab[m] - to_a[m] * ab[l];
     }
-    for (int i = 0; i < 3; i++)
-        weights[i] /= sum;
-    *area_mm2 = 0.5 * sum;
-    return fabs(sum) > 1e-3;
+    const double determinant = render_dot(ab, p);
+    weights[1] = render_dot(to_a, p) / determinant;
+    weights[2] = render_dot(along, q) / determinant;
+    weights[0] = 1 - weights[1] - weights[2];
+    *t = render_dot(ac, q) / determinant;
+    *is_front = determinant > 0;
+    return weights[0] >= 0 && weights[1] >= 0 && weights[2] >= 0;
 }
 
-/* Oracle: each texel's ray against all triangles, in double; the share by dipole_fresnel_reflectance.
- * Corners are moved by up to 1/512 of a texel along x and y: a point by as much, along the light by more
- * the steeper it is (at most by 20 texels' width here, of 0.01 times a corner's weight); texels whose rays
- * pass so near to an edge, or two surfaces so near to each other, are left out. */
+/* Through (x, y) of the picture in texels. */
+static struct hit trace(const struct render_projection *view, const struct soup *soups,
+                        const struct render_light_mesh *meshes, double x, double y)
+{
+    struct hit hit = { .depth_mm = INFINITY, .next_mm = INFINITY };
+    const double u = view->half_width * (2 * x / SIDE - 1), v = view->half_height * (2 * y / SIDE - 1);
+    double from[3], along[3];
+    for (int k = 0; k < 3; k++) {
+        const double aside = u * view->right[k] + v * view->up[k];
+        from[k] = view->eye_mm[k] + (view->is_orthographic ? aside : 0);
+        along[k] = view->forward[k] + (view->is_orthographic ? 0 : aside);
+    }
+    for (int t = 0; t < 2 * TRIANGLES; t++) {
+        const struct soup *const soup = &soups[t / TRIANGLES];
+        double w[3], depth_mm, p[3] = { 0, 0, 0 }, n[3] = { 0, 0, 0 };
+        bool is_front;
+        if (!meet(soup, t % TRIANGLES, from, along, w, &depth_mm, &is_front) || depth_mm < view->near_mm)
+            continue;
+        hit.next_mm = fmin(hit.next_mm, fmax(hit.depth_mm, depth_mm));
+        if (depth_mm >= hit.depth_mm)
+            continue;
+        for (int k = 0; k < 9; k++) {
+            p[k % 3] += w[k / 3] * (double)soup->positions[9 * (t % TRIANGLES) + k];
+            n[k % 3] += w[k / 3] * (double)soup->normals[9 * (t % TRIANGLES) + k];
+        }
+        hit.depth_mm = depth_mm;
+        hit.object = 1 + t / TRIANGLES;
+        hit.triangle = t;
+        memcpy(hit.position_mm, p, sizeof p);
+        const double length = sqrt(render_dot(along, along));
+        const double cosine = -render_dot(n, along) / sqrt(render_dot(n, n)) / length;
+        const double entering =
+            1 - dipole_fresnel_reflectance(meshes[hit.object - 1].eta, fmin(fmax(cosine, 0), 1));
+        hit.share = is_front ? texel_area_of(view, SIDE) * entering / pow(length, 3) : 0;
+    }
+    return hit;
+}
+
+/* Compare where rays that pass a fiftieth of a texel beside agree on what they hit, and no second surface
+ * is as near as they differ; returns how many texels those are. */
+static int compare(const struct render_projection *view, const struct soup *soups,
+                   const struct render_light_mesh *meshes, const float *texels, const float *objects)
+{
+    int compared = 0;
+    for (int i = 0; i < TEXELS; i++) {
+        const double x = i % SIDE + 0.5, y = i / SIDE + 0.5, aside = 0.02;
+        const struct hit hit = trace(view, soups, meshes, x, y);
+        double differ_mm = 0, differ_share = 0;
+        bool is_clear = true;
+        for (int d = 0; d < 4; d++) {
+            const struct hit other =
+                trace(view, soups, meshes, x + (d % 2 ? aside : -aside), y + (d / 2 ? aside : -aside));
+            is_clear &= other.object == hit.object && other.triangle == hit.triangle &&
+                        (hit.object == 0 || other.next_mm - other.depth_mm > 0.1);
+            differ_share = fmax(differ_share, fabs(other.share - hit.share));
+            for (int k = 0; k < 3; k++)
+                differ_mm = fmax(differ_mm, fabs(other.position_mm[k] - hit.position_mm[k]));
+        }
+        if (!is_clear || (hit.object > 0 && hit.depth_mm < 1.01 * view->near_mm))
+            continue;
+        compared++;
+        assert_int_equal((int)objects[i], hit.object);
+        for (int k = 0; k < 3 && hit.object > 0; k++)
+            assert_true(fabs((double)texels[4 * i + k] - hit.position_mm[k]) < differ_mm + 1e-4);
+        assert_true(fabs((double)texels[4 * i + 3] - hit.share) <
+                    differ_share + 1e-4 * texel_area_of(view, SIDE));
+    }
+    return compared;
+}
+
+/* Oracle: each texel's ray against all triangles, in double; the share by dipole_fresnel_reflectance, times
+ * the area across parallel light, or the solid angle that a point light sees. Corners are moved by up to
+ * 1/512 of a texel along x and y; rays that pass by at ten times that bound what it may change. From the
+ * middle of the triangles many are cut by the near plane, or reach far beyond the picture. */
 static void texels_show_what_rays_hit(void **state)
 {
     (void)state;
     struct rng rng = { .seed = 17 };
     static float texels[4 * TEXELS], objects[TEXELS];
-    int compared = 0;
-    for (int round = 0; round < 20; round++) {
+    int compared[3] = { 0, 0, 0 };
+    for (int round = 0; round < 18; round++) {
         struct soup soups[2];
+        struct render_projection views[RENDER_FACES];
         double forward[3];
+        size_t view_count = 1;
         random_direction(&rng, forward);
-        const struct render_projection view = view_along(forward);
+        views[0] = view_along(forward);
         fill_soup(&rng, &soups[0]);
         fill_soup(&rng, &soups[1]);
+        if (round % 3 == 1) {
+            const struct render_ball ball = { .radius_mm = 6.5 };
+            const double eye_mm[3] = { -20 * forward[0], -20 * forward[1], -20 * forward[2] };
+            view_count = render_frusta_of_point(eye_mm, &ball, 1, 1, views);
+            assert_int_equal(view_count, 1);
+        } else if (round % 3 == 2) {
+            const double eye_mm[3] = { forward[0], forward[1], forward[2] };
+            view_count = RENDER_FACES;
+            views_around(eye_mm, log_uniform(&rng, 0.01, 1), 10, views);
+        }
         const struct render_light_mesh meshes[2] = { { .mesh = &soups[0].mesh, .eta = 1.4 },
                                                      { .mesh = &soups[1].mesh, .eta = 0.8 } };
-        draw(meshes, 2, &view, 0, texels, objects);
-        for (int i = 0; i < TEXELS; i++) {
-            const double at_mm[2] = { (i % SIDE + 0.5) * TEXEL_MM - HALF_MM,
-                                      (i / SIDE + 0.5) * TEXEL_MM - HALF_MM };
-            double nearest_mm = INFINITY, next_mm = INFINITY, position_mm[3] = { 0, 0, 0 }, share = 0;
-            bool is_clear = true;
-            int object = 0;
-            for (int t = 0; t < 2 * TRIANGLES; t++) {
-                const struct soup *const soup = &soups[t / TRIANGLES];
-                double w[3], area_mm2, p[3] = { 0, 0, 0 }, n[3] = { 0, 0, 0 }, in_view[3];
-                if (!weights_at(&view, soup, t % TRIANGLES, at_mm, w, &area_mm2)) {
-                    is_clear = false;
-                    continue;
-                }
-                const double least = fmin(w[0], fmin(w[1], w[2]));
-                is_clear &= fabs(least) * sqrt(fabs(area_mm2)) > 0.02;
-                if (least < 0)
-                    continue;
-                for (int k = 0; k < 9; k++) {
-                    p[k % 3] += w[k / 3] * (double)soup->positions[9 * (t % TRIANGLES) + k];
-                    n[k % 3] += w[k / 3] * (double)soup->normals[9 * (t % TRIANGLES) + k];
-                }
-                render_projection_to_view(&view, p, in_view);
-                next_mm = fmin(next_mm, fmax(nearest_mm, in_view[2]));
-                if (in_view[2] >= nearest_mm)
-                    continue;
-                nearest_mm = in_view[2];
-                object = 1 + t / TRIANGLES;
-                memcpy(position_mm, p, sizeof p);
-                const double cosine = -render_dot(n, forward) / sqrt(render_dot(n, n));
-                share = area_mm2 < 0 ? 0
-                                     : TEXEL_MM * TEXEL_MM *
-                                           (1 - dipole_fresnel_reflectance(meshes[object - 1].eta,
-                                                                           fmin(fmax(cosine, 0), 1)));
-            }
-            if (!is_clear || next_mm - nearest_mm < 0.1)
-                continue;
-            compared++;
-            assert_int_equal((int)objects[i], object);
-            for (int k = 0; k < 3 && object > 0; k++)
-                assert_true(fabs((double)texels[4 * i + k] - position_mm[k]) < 0.1);
-            /* Shares change by most where light grazes. */
-            assert_true(fabs((double)texels[4 * i + 3] - share) < 0.15 * TEXEL_MM * TEXEL_MM);
+        for (size_t v = 0; v < view_count; v++) {
+            draw_meshes(meshes, 2, &views[v], round % 4, texels, objects);
+            compared[round % 3] += compare(&views[v], soups, meshes, texels, objects);
         }
     }
-    assert_true(compared > 20 * TEXELS / 10);
+    print_message("  compared: %d parallel, %d perspective, %d of cubes\n", compared[0], compared[1],
+                  compared[2]);
+    assert_true(compared[0] > 6 * TEXELS / 2 && compared[1] > 6 * TEXELS / 2);
+    assert_true(compared[2] > 36 * TEXELS / 4);
 }
 
 /* ---- closed surfaces ---------------------------------------------------------------------------- */
@@ -198,7 +305,7 @@ static void a_sphere_is_a_disc(void **state)
         double forward[3], sum = 0;
         random_direction(&rng, forward);
         const struct render_projection view = view_along(forward);
-        draw(&of, 1, &view, 0, texels, NULL);
+        draw_meshes(&of, 1, &view, 0, texels, NULL);
         for (int i = 0; i < TEXELS; i++) {
             const double x_mm = (i % SIDE + 0.5) * TEXEL_MM - HALF_MM,
                          y_mm = (i / SIDE + 0.5) * TEXEL_MM - HALF_MM;
@@ -227,11 +334,11 @@ static void insides_and_threads_change_nothing(void **state)
         random_direction(&rng, forward);
         const struct render_projection view = view_along(forward);
         of.has_hidden_inside = true;
-        draw(&of, 1, &view, 1, texels, NULL);
-        draw(&of, 1, &view, 5, others, objects);
+        draw_meshes(&of, 1, &view, 1, texels, NULL);
+        draw_meshes(&of, 1, &view, 5, others, objects);
         assert_memory_equal(texels, others, sizeof texels);
         of.has_hidden_inside = false;
-        draw(&of, 1, &view, 3, others, NULL);
+        draw_meshes(&of, 1, &view, 3, others, NULL);
         int different = 0;
         for (int i = 0; i < TEXELS; i++) {
             for (int k = 0; k < 4; k++)
@@ -244,12 +351,216 @@ static void insides_and_threads_change_nothing(void **state)
     io_mesh_destroy(mesh);
 }
 
+/* ---- all around --------------------------------------------------------------------------------- */
+
+/* Share of what a point light at a_mm from the middle of a hollow ball sends out that enters it: the
+ * midpoint rule over the cosine to the axis. */
+static double hollow_ball_share(double a_mm, double radius_mm, double eta)
+{
+    enum { STEPS = 4000 };
+    double sum = 0;
+    for (int i = 0; i < STEPS; i++) {
+        const double mu = -1 + (i + 0.5) * 2 / STEPS;
+        const double sine = a_mm / radius_mm * sqrt(1 - mu * mu);
+        sum += 1 - dipole_fresnel_reflectance(eta, sqrt(1 - sine * sine));
+    }
+    return sum / STEPS;
+}
+
+/* Oracle: the closed surface about a light. No ray leaves it, whatever triangles are cut by near planes and
+ * by those between the faces of the cube, and all that enters is that of the ball, to what its facets make
+ * of it. Coarse balls are of triangles that several faces share. */
+static void a_hollow_ball_is_seen_without_holes(void **state)
+{
+    (void)state;
+    const double pi = 3.14159265358979323846, radius_mm = 5, eta = 1.4;
+    const struct {
+        int detail;
+        double at_mm[3], tolerance;
+    } rows[] = { { 96, { 0, 0, 0 }, 2e-3 },  { 96, { 1, -2, 1.5 }, 2e-3 },  { 96, { 0, 4.6, 0 }, 0.02 },
+                 { 8, { 0.5, 0, 0 }, 0.1 },  { 4, { 0.1, 0.2, 0.3 }, 0.3 }, { 4, { 0, 0, 0 }, 0.3 },
+                 { 12, { 1, 3.9, 1 }, 0.1 }, { 96, { 0, -4.95, 0 }, 0.1 } };
+    static float texels[4 * TEXELS], objects[TEXELS];
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        struct io_mesh *const mesh = make_primitive(IO_PRIMITIVE_SPHERE, rows[r].detail, (float)radius_mm);
+        for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
+            mesh->normals[i] = -mesh->normals[i];
+        for (size_t t = 0; t < mesh->triangle_count; t++) {
+            const uint32_t swap = mesh->indices[3 * t];
+            mesh->indices[3 * t] = mesh->indices[3 * t + 1];
+            mesh->indices[3 * t + 1] = swap;
+        }
+        const struct render_light_mesh of = { .mesh = mesh, .eta = eta };
+        struct render_projection faces[RENDER_FACES];
+        views_around(rows[r].at_mm, 0.01, 12, faces);
+        double sum = 0;
+        for (int f = 0; f < RENDER_FACES; f++) {
+            draw_meshes(&of, 1, &faces[f], f % 3, texels, objects);
+            for (int i = 0; i < TEXELS; i++) {
+                assert_true(objects[i] == 1 && texels[4 * i + 3] > 0);
+                sum += (double)texels[4 * i + 3];
+            }
+        }
+        const double a_mm = sqrt(render_dot(rows[r].at_mm, rows[r].at_mm));
+        assert_close(sum, 4 * pi * hollow_ball_share(a_mm, radius_mm, eta), rows[r].tolerance, "row %zu",
+                     r);
+        io_mesh_destroy(mesh);
+    }
+}
+
+/* ---- hard cases --------------------------------------------------------------------------------- */
+
+/* Oracle: what OpenGL leaves out, too: nothing is drawn of triangles without area, behind the light, before
+ * the near plane or beside the picture. Coordinates of any size, near the light or far beyond the picture,
+ * give finite texels in front of the near plane. */
+static void hard_triangles_do_no_harm(void **state)
+{
+    (void)state;
+    struct rng rng = { .seed = 23 };
+    static float texels[4 * TEXELS], objects[TEXELS];
+    const double origin[3] = { 0, 0, 0 };
+    struct render_projection faces[RENDER_FACES];
+    size_t seen = 0;
+    for (int round = 0; round < 60; round++) {
+        struct soup soup;
+        fill_soup(&rng, &soup);
+        const double scale = log_uniform(&rng, 1e-18, 1e18), near_mm = scale * log_uniform(&rng, 1e-4, 1);
+        for (int i = 0; i < 9 * TRIANGLES; i++) {
+            const double far_out = i % 4 ? 1 : log_uniform(&rng, 1e-6, 1e6);
+            soup.positions[i] = (float)(scale * far_out * (double)soup.positions[i]);
+            if (i / 9 % 6 == 0 && i % 9 >= 6) /* no area: two corners are one */
+                soup.positions[i] = soup.positions[i - 3];
+            if (i / 9 % 6 == 1) /* all the same */
+                soup.positions[i] = soup.positions[i / 9 * 9 + i % 3];
+        }
+        double rounding_mm = 0; /* of floats */
+        for (int i = 0; i < 9 * TRIANGLES; i++)
+            rounding_mm = fmax(rounding_mm, 1e-6 * fabs((double)soup.positions[i]));
+        const struct render_light_mesh of = { .mesh = &soup.mesh, .eta = 1.3 };
+        views_around(origin, near_mm, scale * 10, faces);
+        for (int f = 0; f < RENDER_FACES; f++) {
+            draw_meshes(&of, 1, &faces[f], f % 3, texels, objects);
+            for (int i = 0; i < TEXELS; i++) {
+                double position_mm[3], in_view_mm[3];
+                assert_true(texels[4 * i + 3] >= 0 &&
+                            (double)texels[4 * i + 3] <= 1.00001 * texel_area_of(&faces[f], SIDE));
+                for (int k = 0; k < 3; k++)
+                    position_mm[k] = (double)texels[4 * i + k];
+                render_projection_to_view(&faces[f], position_mm, in_view_mm);
+                assert_true(objects[i] == 0 || in_view_mm[2] > 0.9 * near_mm - rounding_mm);
+                seen += objects[i] == 1;
+            }
+        }
+    }
+    assert_true(seen > 60 * TEXELS / 4);
+    struct soup behind;
+    fill_soup(&rng, &behind);
+    for (int i = 2; i < 9 * TRIANGLES; i += 3)
+        behind.positions[i] = -1 - fabsf(behind.positions[i]);
+    views_around(origin, 0.1, 10, faces);
+    const struct render_light_mesh of = { .mesh = &behind.mesh, .eta = 1.3 };
+    draw_meshes(&of, 1, &faces[4], 0, texels, objects); /* +z */
+    for (int i = 0; i < TEXELS; i++)
+        assert_true(objects[i] == 0 && texels[4 * i + 3] == 0);
+}
+
+/* ---- OpenGL ------------------------------------------------------------------------------------- */
+
+/* What the last view that OpenGL drew holds, and the same drawn in memory. */
+static void compare_with_opengl(const struct renderer *renderer, const struct render_plan *plan,
+                                const struct io_scene *scene)
+{
+    const struct render_plan_view *const view = &plan->views[plan->view_count - 1];
+    const size_t count = (size_t)view->size_px * (size_t)view->size_px;
+    float *const drawn = malloc(count * 4 * sizeof *drawn), *const texels =
+                                                                malloc(count * 4 * sizeof *texels);
+    assert_true(drawn && texels);
+    glGetTextureSubImage(render_executor_texture(renderer->executor, "light_view"), 0, 0, 0, 0,
+                         view->size_px, view->size_px, 1, GL_RGBA, GL_FLOAT,
+                         (GLsizei)(count * 4 * sizeof *drawn), drawn);
+    const struct render_light_mesh meshes[2] = { { .mesh = scene->objects[0].mesh, .eta = 1.5 },
+                                                 { .mesh = scene->objects[1].mesh, .eta = 1.5 } };
+    const struct render_light_picture picture = { .meshes = meshes,
+                                                  .mesh_count = 2,
+                                                  .projection = &view->projection,
+                                                  .size_px = view->size_px,
+                                                  .texel_area = view->texel_area };
+    draw_picture(&picture, 64, 0, texels, NULL);
+    size_t lit = 0, differing = 0;
+    double flux[2] = { 0, 0 }, far_mm = 0;
+    for (size_t i = 0; i < count; i++) {
+        const float *const a = drawn + 4 * i, *const b = texels + 4 * i;
+        double step2_mm2 = 0;
+        for (int k = 0; k < 3; k++)
+            step2_mm2 += ((double)a[k] - (double)b[k]) * ((double)a[k] - (double)b[k]);
+        flux[0] += (double)a[3];
+        flux[1] += (double)b[3];
+        lit += a[3] > 0 || b[3] > 0;
+        if ((a[3] > 0) != (b[3] > 0) || (a[3] > 0 && step2_mm2 > 0.01 * 0.01)) {
+            differing++;
+            continue;
+        }
+        if (a[3] > 0) {
+            far_mm = fmax(far_mm, sqrt(step2_mm2));
+            assert_true(fabs((double)a[3] - (double)b[3]) < 0.02 * view->texel_area);
+        }
+    }
+    print_message("  %zu views of %d texels a side: %zu of %zu lit texels differ, others by %.1g mm\n",
+                  plan->view_count, view->size_px, differing, lit, far_mm);
+    assert_true(lit > 1000 && differing < lit / 500);
+    assert_close(flux[1], flux[0], 1e-4, "power of %zu views", plan->view_count);
+    free(drawn);
+    free(texels);
+}
+
+/* Oracle: pass light_view, which draws the same where surfaces are glossy. Both round corners to 1/256 of a
+ * texel, so only outlines may differ, and surfaces that light grazes. */
+static void opengl_draws_the_same(void **state)
+{
+    (void)state;
+    const double positions_mm[3][3] = { { 30, 25, 40 }, { 0.5, 2, 1 }, { -8, -3, 0 } };
+    for (int light = 0; light < 4; light++) {
+        struct test_scene test;
+        const struct io_material material = marble();
+        scene_init(&test, 60);
+        assert_true(scene_add(&test, IO_PRIMITIVE_KNOT, 96, 4, -5, &material));
+        assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 24, 5, 6, &material));
+        if (light == 3)
+            scene_add_directional(&test, -1, -1, -2, 3);
+        else
+            scene_add_point(&test, positions_mm[light][0], positions_mm[light][1], positions_mm[light][2],
+                            400);
+        for (int i = 0; i < 2; i++) {
+            test.objects[i].has_specular = true;
+            test.objects[i].casts = IO_CASTS_OPAQUE; /* else each has views of its own */
+        }
+        struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
+        const struct render_request request = { .scene = &test.scene,
+                                                .media = renderer->media,
+                                                .epsilon = 0.03,
+                                                .technique = RENDER_TECHNIQUE_GATHER };
+        struct render_plan *plan;
+        double time_ms[RENDER_EFFECT_LIMIT];
+        dipole_status status;
+        if (!render_run(renderer, &request, &plan, time_ms, &status))
+            fail_msg("%s", status.message);
+        assert_false(plan->has_light_pictures);
+        compare_with_opengl(renderer, plan, &test.scene);
+        render_plan_destroy(plan);
+        render_destroy(renderer);
+        scene_end(&test);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(texels_show_what_rays_hit),
         cmocka_unit_test(a_sphere_is_a_disc),
         cmocka_unit_test(insides_and_threads_change_nothing),
+        cmocka_unit_test(a_hollow_ball_is_seen_without_holes),
+        cmocka_unit_test(hard_triangles_do_no_harm),
+        cmocka_unit_test(opengl_draws_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

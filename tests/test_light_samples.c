@@ -27,9 +27,11 @@ static void fill_plane(float *texels, double slope_x, double slope_y)
 
 static struct render_light_samples reduce(const float *texels, double spacing_mm)
 {
-    const struct render_light_view view = {
-        .texels = texels, .size_px = SIDE, .forward = { 0, 0, -1 }, .rgb = { 1, 2, 4 }, .levels = LEVELS
-    };
+    const struct render_light_view view = { .texels = texels,
+                                            .size_px = SIDE,
+                                            .forward = { 0, 0, -1 },
+                                            .rgb = { 1, 2, 4 },
+                                            .block_px = 1 << LEVELS };
     struct render_light_samples samples = { 0 };
     const struct render_light_target target = { .samples = &samples, .spacing_mm = spacing_mm };
     assert_true(render_light_samples_append(&target, &view, NULL));
@@ -242,7 +244,7 @@ static void quarters_come_one_after_the_other(void **state)
                                                 .size_px = HALF,
                                                 .forward = { 0, 0, -1 },
                                                 .rgb = { 1, 2, 4 },
-                                                .levels = LEVELS };
+                                                .block_px = 1 << LEVELS };
         const struct render_light_target target = { .samples = &parts, .spacing_mm = 0.8 };
         assert_true(render_light_samples_append(&target, &view, NULL));
     }
@@ -250,6 +252,79 @@ static void quarters_come_one_after_the_other(void **state)
     assert_memory_equal(whole.samples, parts.samples, whole.count * sizeof *whole.samples);
     render_light_samples_destroy(&whole);
     render_light_samples_destroy(&parts);
+}
+
+/* Tiles of a whole picture, in place of drawn ones. */
+struct tiles {
+    const float *texels, *objects;
+    int tile_px;
+};
+
+static bool copy_tile(const void *context, int x, int y, float *texels, float *objects)
+{
+    const struct tiles *const tiles = context;
+    bool is_lit = false;
+    for (int j = 0; j < tiles->tile_px; j++) {
+        for (int i = 0; i < tiles->tile_px; i++) {
+            const bool is_inside = x + i >= 0 && x + i < SIDE && y + j >= 0 && y + j < SIDE;
+            const int from = is_inside ? (y + j) * SIDE + x + i : 0, to = j * tiles->tile_px + i;
+            for (int k = 0; k < 4; k++)
+                texels[4 * to + k] = is_inside ? tiles->texels[4 * from + k] : 0;
+            if (objects)
+                objects[to] = is_inside ? tiles->objects[from] : 0;
+            is_lit |= texels[4 * to + 3] > 0;
+        }
+    }
+    return is_lit;
+}
+
+/* Oracle: the whole picture. Drawn tile by tile it gives the same samples to the last bit, blocks of
+ * whatever size, shifted by half of one or not, objects told apart or not; so does a part of it that is
+ * dark. */
+static void tiles_give_what_the_picture_does(void **state)
+{
+    (void)state;
+    static float texels[4 * SIDE * SIDE], objects[SIDE * SIDE];
+    static const int blocks_px[] = { 4, 8, 12, 20, 48, 64 };
+    struct rng rng = { .seed = 8 };
+    for (int round = 0; round < 24; round++) {
+        fill_plane(texels, uniform(&rng, -3, 3), uniform(&rng, -3, 3));
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            objects[i] = (float)(1 + (i % SIDE / 7 + i / SIDE / 5) % 2);
+            if (i % SIDE < 20 || uniform(&rng, 0, 1) < 0.1)
+                texels[4 * i + 3] = 0;
+        }
+        struct render_light_samples whole[2] = { { 0 }, { 0 } }, tiled[2] = { { 0 }, { 0 } };
+        const struct render_light_target to_whole[2] = { { .samples = &whole[0], .spacing_mm = 0.9 },
+                                                         { .samples = &whole[1], .spacing_mm = 0.6 } };
+        const struct render_light_target to_tiled[2] = { { .samples = &tiled[0], .spacing_mm = 0.9 },
+                                                         { .samples = &tiled[1], .spacing_mm = 0.6 } };
+        const bool has_objects = round % 2 == 1;
+        struct render_light_view view = { .texels = texels,
+                                          .objects = has_objects ? objects : NULL,
+                                          .size_px = SIDE,
+                                          .block_px = blocks_px[round / 4],
+                                          .forward = { 0, 0, -1 },
+                                          .rgb = { 1, 2, 4 },
+                                          .is_shifted = round / 2 % 2 == 1 };
+        assert_true(render_light_samples_append(to_whole, &view, NULL));
+        const struct tiles tiles = { texels, objects, render_light_tile_px(view.block_px) };
+        view.texels = view.objects = NULL;
+        view.draw_tile = copy_tile;
+        view.tiles = &tiles;
+        view.tile_px = tiles.tile_px;
+        view.tile_object_count = has_objects ? 2 : 0;
+        assert_true(render_light_samples_append(to_tiled, &view, NULL));
+        for (int o = 0; o < 2; o++) {
+            assert_true(whole[o].count > 20 || (o == 1 && !has_objects));
+            assert_int_equal(tiled[o].count, whole[o].count);
+            if (whole[o].count > 0)
+                assert_memory_equal(tiled[o].samples, whole[o].samples,
+                                    whole[o].count * sizeof *whole[o].samples);
+            render_light_samples_destroy(&whole[o]);
+            render_light_samples_destroy(&tiled[o]);
+        }
+    }
 }
 
 /* Oracle: no surface, no samples. */
@@ -276,6 +351,7 @@ int main(void)
         cmocka_unit_test(merging_conserves_flux_and_bounds_the_count),
         cmocka_unit_test(merging_leaves_one_sample_for_each_cube),
         cmocka_unit_test(quarters_come_one_after_the_other),
+        cmocka_unit_test(tiles_give_what_the_picture_does),
         cmocka_unit_test(an_empty_view_gives_none),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

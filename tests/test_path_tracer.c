@@ -240,7 +240,7 @@ static void point_light_is_even_on_a_sphere(void **state)
     scene.light = (struct tracer_light){ TRACER_POINT, { 0 }, { 1, 2, 6.5 }, 1 };
     struct tracer_shape shape;
     struct tracer_lamp lamp;
-    struct tracer_stream stream = { { 1, 2, 3, 4 } };
+    struct accuracy_stream stream = { { 1, 2, 3, 4 } };
     tracer_shape_init(&scene.body, &shape);
     tracer_lamp_init(&scene.light, &lamp);
     const double least_cosine = sqrt(1 - 4 / (3.5 * 3.5));

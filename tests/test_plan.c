@@ -3,6 +3,7 @@
 #include "scenes.h"
 
 #include "io/scene_motion.h"
+#include "renderer/light_samples.h"
 #include "renderer/splats.h"
 
 static struct render_request request_for(const struct test_scene *test)
@@ -39,7 +40,15 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     struct test_scene test;
     init_sphere(&test);
     const struct io_material other = skin1();
-    enum { REQUESTS = 18, FIRST_AROUND = 11, MOVING = 15, BY_OPENGL = 16, SHADOWED = 17 };
+    enum {
+        REQUESTS = 20,
+        FIRST_AROUND = 11,
+        MOVING = 15,
+        BY_OPENGL = 16,
+        SHADOWED = 17,
+        SHADOWED_MAPS = 18,
+        SHADED_BY_ITSELF = 19 /* for want of a triangle it may not be convex */
+    };
     struct render_request requests[REQUESTS];
     for (int i = 0; i < REQUESTS; i++)
         requests[i] = request_for(&test);
@@ -64,13 +73,15 @@ static void every_effect_is_called_for_by_some_scene_only(void **state)
     requests[13].technique = RENDER_TECHNIQUE_LAMBERT;
     requests[14].technique = RENDER_TECHNIQUE_SPLAT;
     requests[BY_OPENGL].gather = RENDER_GATHER_GL;
+    requests[SHADOWED_MAPS].technique = RENDER_TECHNIQUE_TSM;
     test.scene.environment.rgb[0] = 1;
     strcpy(test.scene.environment.path, SOURCE_FOLDER "/scenes/probes/studio.exr");
     for (int i = 0; i < REQUESTS; i++) {
         test.scene.has_environment = i >= FIRST_AROUND && i < MOVING;
         test.objects[0].has_specular = i == 3 || i == SHADOWED;
-        test.scene.blocker_count = i == SHADOWED;
-        test.lights[0].size_rad = i == SHADOWED ? 0.1 : 0;
+        test.scene.blocker_count = i >= SHADOWED;
+        test.lights[0].size_rad = i >= SHADOWED ? 0.1 : 0;
+        test.objects[0].mesh->triangle_count -= i == SHADED_BY_ITSELF;
         if (i == 5)
             assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 2, 5, &other));
         test.scene.light_count = i == 4 ? 0 : 1;
@@ -277,6 +288,60 @@ static void the_error_budget_is_kept(void **state)
     scene_end(&test);
 }
 
+static const char *dearest_of(const struct render_plan *plan)
+{
+    size_t dearest = 0;
+    for (size_t e = 1; e < plan->effect_count; e++)
+        dearest = plan->decisions[e].cost_ms > plan->decisions[dearest].cost_ms ? e : dearest;
+    return render_effects[dearest]->name;
+}
+
+/* Oracle: the definition. The error that a budget buys is the least of those a tenth of a decade apart that
+ * are within it; where none is, the plan says so and names what is dearest. */
+static void a_budget_buys_the_least_error_within_it(void **state)
+{
+    (void)state;
+    struct test_scene test;
+    init_sphere(&test);
+    test.scene.camera.width_px = 800;
+    test.scene.camera.height_px = 600;
+    static const double budgets_ms[] = { 1, 160, 180, 200, 1e6 };
+    double epsilon_before = RENDER_EPSILON_MAX;
+    for (int i = 0; i < 5; i++) {
+        struct render_request request = request_for(&test);
+        request.budget_ms = budgets_ms[i];
+        assert_true(render_plan_spend_budget(&request, NULL));
+        struct render_plan *plan = plan_for(&request);
+        const double cost_ms = render_plan_cost_ms(plan);
+        print_message("  %g ms: epsilon %.3g, predicted %.3g ms\n", budgets_ms[i], plan->epsilon, cost_ms);
+        assert_true(plan->epsilon == request.epsilon && plan->epsilon <= epsilon_before);
+        assert_true(plan->budget_ms == budgets_ms[i]);
+        if (cost_ms > budgets_ms[i]) {
+            assert_true(i == 0 && plan->epsilon == RENDER_EPSILON_MAX);
+            assert_non_null(strstr(plan->notes[0], "a budget of 1 ms cannot be kept"));
+            assert_non_null(strstr(plan->notes[0], dearest_of(plan)));
+        } else {
+            assert_int_equal(plan->note_count, 1);
+        }
+        assert_non_null(strstr(plan->notes[plan->note_count - 1], "accuracy --calibrate"));
+        epsilon_before = plan->epsilon;
+        render_plan_destroy(plan);
+        if (request.epsilon > RENDER_BUDGET_EPSILON_MIN && i > 0) {
+            request.epsilon /= 1.26;
+            request.budget_ms = 0;
+            plan = plan_for(&request);
+            assert_true(render_plan_cost_ms(plan) > budgets_ms[i]);
+            render_plan_destroy(plan);
+        }
+    }
+    assert_true(epsilon_before == RENDER_BUDGET_EPSILON_MIN);
+    struct render_request request = request_for(&test);
+    const double epsilon = request.epsilon;
+    assert_true(render_plan_spend_budget(&request, NULL));
+    assert_true(request.epsilon == epsilon); /* without one nothing is searched for */
+    scene_end(&test);
+}
+
 /* Oracle: the definition. Where scattering stays within a pixel, neither gathering nor splats are called
  * for; nor is gathering for an error that single precision and cubics cannot keep. */
 static void auto_takes_lambert_when_scattering_is_under_a_pixel(void **state)
@@ -303,6 +368,39 @@ static void auto_takes_lambert_when_scattering_is_under_a_pixel(void **state)
     render_plan_destroy(far_plan);
     render_plan_destroy(asked_plan);
     scene_end(&test);
+}
+
+/* Oracle: T45. Cells no wider than 0.7 of the spacing, as many texels to each as make 768 in all or four,
+ * no more; parallel light and a point light that is far away alike, drawn in memory unless a surface is
+ * glossy. */
+static void texels_of_views_follow_need(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 60; i++) {
+        struct test_scene test;
+        init_sphere(&test);
+        test.scene.light_count = (size_t)(i % 2 == 0);
+        if (test.scene.light_count == 0)
+            scene_add_point(&test, 3e3, 5e3, 4e3, 1e6);
+        struct render_request request = request_for(&test);
+        request.technique = RENDER_TECHNIQUE_GATHER;
+        request.spacing_mm = 0.05 * exp2(i / 10.0);
+        struct render_plan *plan = plan_for(&request);
+        const struct render_projection *const view = &plan->views[0].projection;
+        const double wide_mm = 2 * view->half_width * (view->is_orthographic ? 1 : view->far_mm),
+                     cells = wide_mm / (0.7 * plan->spacing_mm);
+        const int size_px = plan->views[0].size_px;
+        assert_true(size_px >= 4 * cells && size_px >= 768);
+        assert_true(size_px <= fmax(4 * (cells + 1), 768 + cells + 1));
+        assert_true(plan->views[0].block_px <= RENDER_LIGHT_BLOCK_LIMIT);
+        assert_true(plan->has_light_pictures && !decision_of(plan, "light_view")->is_active);
+        render_plan_destroy(plan);
+        test.objects[0].has_specular = true;
+        plan = plan_for(&request);
+        assert_true(!plan->has_light_pictures && decision_of(plan, "light_view")->is_active);
+        render_plan_destroy(plan);
+        scene_end(&test);
+    }
 }
 
 /* Oracle: 4096 texels over 2000 mm are too coarse for marble: the plan says so, blurs and predicts more. */
@@ -566,7 +664,9 @@ int main(void)
         cmocka_unit_test(passes_per_view_are_repeated_together),
         cmocka_unit_test(every_texture_has_a_row),
         cmocka_unit_test(the_error_budget_is_kept),
+        cmocka_unit_test(a_budget_buys_the_least_error_within_it),
         cmocka_unit_test(auto_takes_lambert_when_scattering_is_under_a_pixel),
+        cmocka_unit_test(texels_of_views_follow_need),
         cmocka_unit_test(a_light_view_that_is_too_coarse_is_told),
         cmocka_unit_test(the_callers_table_counts),
         cmocka_unit_test(every_vertex_is_in_a_lights_view),

@@ -93,7 +93,7 @@ static void the_plan_keeps_to_the_grid_and_tells_what_it_leaves(void **state)
     struct render_plan *const chosen = plan_for(&request);
     assert_true(coarse->has_grid && coarse->band_count == 1 && coarse->of_medium[0].band_count == 1);
     assert_int_equal(coarse->views[0].size_px, 64);
-    assert_int_equal(coarse->views[0].levels, 0);
+    assert_int_equal(coarse->views[0].block_px, 1);
     assert_close(coarse->grid_texel_mm, 2 * coarse->views[0].projection.half_width / 64, 1e-12, "texel");
     assert_close(coarse->of_medium[0].bands[0].r_outer_mm, coarse->of_medium[0].r_max_mm, 0, "reach");
     assert_true(coarse->blur_error == 0 && coarse->banding_error == 0);

@@ -42,12 +42,13 @@ static void check_projection(const struct render_projection *projection, uint64_
 
 static void check_views(const struct render_plan *plan, uint64_t seed)
 {
-    assert_plan(plan->view_count <= 6 * plan->lit_count);
+    const size_t of_light = plan->shadows.object_count > 0 ? 12 * plan->media->object_count : 6;
+    assert_plan(plan->view_count <= of_light * plan->lit_count);
     for (size_t i = 0; i < plan->view_count; i++) {
         const struct render_plan_view *const view = &plan->views[i];
         check_projection(&view->projection, seed);
         assert_plan(view->size_px >= 1 && view->size_px <= 4096);
-        assert_plan(view->levels >= 0 && view->levels <= 12);
+        assert_plan(view->block_px >= 1 && view->block_px <= 128);
         assert_plan(isfinite(view->texel_area) && view->texel_area > 0);
     }
 }

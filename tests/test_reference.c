@@ -626,9 +626,10 @@ static void the_program_needs_no_opengl(void **state)
     const char *technique, *image;
     double epsilon, total_ms;
     json_int_t peak_rss_bytes;
-    json_t *effects;
-    assert_int_equal(json_unpack(result, "{s:s, s:f, s:o, s:f, s:I, s:s !}", "technique", &technique,
-                                 "epsilon", &epsilon, "effects", &effects, "total_ms", &total_ms,
+    json_t *effects, *error_predicted;
+    assert_int_equal(json_unpack(result, "{s:s, s:f, s:o, s:n, s:o, s:f, s:I, s:s !}", "technique",
+                                 &technique, "epsilon", &epsilon, "error_predicted", &error_predicted,
+                                 "predicted_ms", "effects", &effects, "total_ms", &total_ms,
                                  "peak_rss_bytes", &peak_rss_bytes, "image", &image),
                      0);
     assert_string_equal(technique, "reference");

@@ -12,7 +12,8 @@ static void write_scene(const char *lights, const char *objects)
 {
     FILE *const file = fopen("scene.json", "w");
     assert_non_null(file);
-    fprintf(file, HEAD "\"lights\": [%s],\n\"objects\": [%s]\n}\n", lights, objects);
+    fprintf(file, HEAD "\"lights\": [%s],\n\"objects\": [%s]\n%s}\n", lights, objects,
+            strstr(objects, "\"motion\": {") ? ", \"frames\": {\"count\": 10}" : "");
     assert_int_equal(fclose(file), 0);
 }
 
@@ -103,10 +104,14 @@ static void wrong_blockers_are_refused(void **state)
           SEEN ", {\"opacity\": 1, \"fibres\": {\"count\": 1000000, \"radius\": 1, \"segments\": 100}}",
           "4:96: objects[1].fibres asks for too much: 602000000 triangles are more than the 20000000 that "
           "a mesh may have" },
-        { LIGHT, SEEN ", {\"opacity\": 1, \"motion\": 3}",
-          "4:86: unknown key \"motion\" in objects[1], expected opacity, extinction_per_mm, extinction_of, "
-          "mesh, "
-          "primitive, detail, particles, fibres, transform, sheet, name" },
+        { LIGHT, SEEN ", {\"opacity\": 1, \"roughness\": 3}",
+          "4:86: unknown key \"roughness\" in objects[1], expected opacity, extinction_per_mm, "
+          "extinction_of, mesh, primitive, detail, particles, fibres, transform, sheet, name, deform, "
+          "motion" },
+        { LIGHT, SEEN ", {\"opacity\": 1, \"primitive\": \"cube\", \"motion\": 3}",
+          "4:117: objects[1].motion is a number, expected an object" },
+        { LIGHT, SEEN ", {\"opacity\": 1, \"particles\": {\"count\": 1, \"radius\": 1}, \"deform\": []}",
+          "4:136: objects[1].deform has 0 elements, expected 1 to 4" },
         { "{\"kind\": \"directional\", \"direction\": [0, -1, 0], \"size_deg\": 91}", SEEN,
           "3:73: lights[0].size_deg is 91, expected 0 to 90" },
         { "{\"kind\": \"point\", \"position\": [0, -1, 0], \"size\": -1}", SEEN,
@@ -159,12 +164,46 @@ static void blockers_and_sizes_are_written(void **state)
     io_scene_destroy(scene);
 }
 
+/* Oracle: an object of the same shape with the same keys (test_scene_motion.c), in the order of frames and
+ * back; what is moved alone is moved by hand. */
+static void blockers_move_as_objects_do(void **state)
+{
+    (void)state;
+#define MOVES                                                                                              \
+    "\"primitive\": \"torus\", \"detail\": 8, \"deform\": [{\"kind\": \"twist\", \"angle_deg\": [0, "      \
+    "90]}], "                                                                                              \
+    "\"motion\": {\"keys\": [{\"frame\": 0}, {\"frame\": 8, \"turn_deg\": 90, \"translate\": [1, 2, "      \
+    "3]}], "                                                                                               \
+    "\"axis\": [1, 0, 0]}"
+    struct io_scene *const scene =
+        read_scene(LIGHT, "{\"material\": \"marble\", " MOVES "}, {\"opacity\": 0.5, " MOVES "},"
+                          "{\"opacity\": 1, \"particles\": {\"count\": 5, \"radius\": 0.1}, \"motion\": "
+                          "{\"translate\": [10, 0, 0]}}");
+    const struct io_blocker *const moved = &scene->blockers[0], *const dust = &scene->blockers[1];
+    float first_mm[15];
+    memcpy(first_mm, dust->mesh->positions, sizeof first_mm);
+    static const int frames[] = { 0, 3, 9, 0 };
+    for (size_t f = 0; f < sizeof frames / sizeof *frames; f++) {
+        io_scene_set_frame(scene, frames[f]);
+        const struct io_mesh *const expected = scene->objects[0].mesh, *const found = moved->mesh;
+        assert_int_equal(found->vertex_count, expected->vertex_count);
+        assert_memory_equal(found->positions, expected->positions,
+                            3 * expected->vertex_count * sizeof(float));
+        assert_memory_equal(found->max, expected->max, sizeof found->max);
+        for (int i = 0; i < 15; i++) /* 10 units of 2 mm over 10 frames */
+            assert_float_equal(dust->mesh->positions[i],
+                               first_mm[i] + (i % 3 == 0 ? 2.0f * (float)frames[f] : 0), 1e-5);
+    }
+    io_scene_destroy(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_key_arrives),
         cmocka_unit_test(wrong_blockers_are_refused),
         cmocka_unit_test(blockers_and_sizes_are_written),
+        cmocka_unit_test(blockers_move_as_objects_do),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

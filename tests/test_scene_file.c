@@ -101,6 +101,7 @@ static void defaults_are_as_documented(void **state)
     assert_true(scene->objects[0].material.layers[2][0].medium.sigma_a_per_mm == 2);
     assert_true(scene->objects[0].roughness == 0.3);
     assert_true(scene->objects[0].has_specular);
+    assert_int_equal(scene->objects[0].casts, IO_CASTS_AUTO);
     for (int axis = 0; axis < 3; axis++) {
         assert_close(scene->min_mm[axis], -1, 1e-6, "min %d", axis);
         assert_close(scene->max_mm[axis], 1, 1e-6, "max %d", axis);
@@ -116,7 +117,7 @@ static void every_key_arrives(void **state)
         .camera = "\"eye\": [1, 2, 3], \"target\": [4, 5, 6], \"up\": [0, 0, 1], \"height\": 7, \"size\": "
                   "[64, 48]",
         .lights = "{\"kind\": \"point\", \"position\": [1, 2, 3], \"intensity\": [4, 5, 6]}, " LIGHT,
-        .object = "\"name\": \"it\", \"roughness\": 0.5, \"specular\": false, "
+        .object = "\"name\": \"it\", \"roughness\": 0.5, \"specular\": false, \"casts\": \"translucent\", "
                   "\"transform\": {\"translate\": [1, 2, 3]}, " OBJECT,
         .more = "\"unit_mm\": 10, \"exposure_ev\": -1.5, \"background\": [0.1, 0.2, 0.3]",
     });
@@ -140,6 +141,7 @@ static void every_key_arrives(void **state)
     assert_string_equal(scene->objects[0].name, "it");
     assert_true(scene->objects[0].roughness == 0.5);
     assert_false(scene->objects[0].has_specular);
+    assert_int_equal(scene->objects[0].casts, IO_CASTS_TRANSLUCENT);
     io_scene_destroy(scene);
 
     const struct io_scene_options options = { .width_px = 20, .height_px = 10 };
@@ -713,7 +715,9 @@ static void wrong_values_are_refused(void **state)
           "4:26: objects[0].specular is a number, expected true or false" },
         { { .object = "\"colour\": 1, " OBJECT },
           "4:14: unknown key \"colour\" in objects[0], expected material, mesh, primitive, detail, name, "
-          "transform, roughness, specular, mesh_sequence, deform, motion" },
+          "transform, roughness, specular, mesh_sequence, deform, motion, casts" },
+        { { .object = "\"casts\": \"shade\", " OBJECT },
+          "4:23: objects[0].casts is \"shade\", expected \"auto\" or \"opaque\" or \"translucent\"" },
         { { .object = "\"transform\": {\"scale\": 0}, " OBJECT },
           "4:37: objects[0].transform.scale is 0, expected 1e-06 to 1e+06, or the same below 0 to mirror" },
         { { .object = "\"transform\": {\"scale\": [1, 0, 1]}, " OBJECT },

@@ -272,6 +272,76 @@ static void penumbras_are_near_those_of_rays(void **state)
     }
 }
 
+/* Red of a picture by Lambert, which all faces of the cube about a light add to. */
+static void draw_lambert(const struct shadow_scene *scene, struct drawn *drawn)
+{
+    struct renderer *renderer = NULL;
+    struct io_image *image = NULL;
+    dipole_status status;
+    if (!render_create(&scene->test.scene, RENDER_CONTEXT_DEFAULT, &renderer, &status) ||
+        !render_draw(renderer, &(struct render_options){ .technique = RENDER_TECHNIQUE_LAMBERT }, &image,
+                     NULL, &status))
+        fail_msg("%s", status.message);
+    drawn->shadow = read_texture(renderer, "position_mm"); /* as large */
+    memcpy(drawn->shadow, image->pixels, 4 * PIXELS * sizeof(float));
+    drawn->position_mm = read_texture(renderer, "position_mm");
+    drawn->normal = read_texture(renderer, "normal");
+    io_image_destroy(image);
+    render_destroy(renderer);
+}
+
+/* Make a blocker thin, as high as its middle. */
+static void flatten(struct io_blocker *blocker)
+{
+    struct io_mesh *const mesh = blocker->mesh;
+    const float middle = 0.5f * (mesh->min[1] + mesh->max[1]);
+    for (size_t v = 0; v < mesh->vertex_count; v++)
+        mesh->positions[3 * v + 1] = middle + 0.02f * (mesh->positions[3 * v + 1] - middle);
+    mesh->min[1] = middle + 0.02f * (mesh->min[1] - middle);
+    mesh->max[1] = middle + 0.02f * (mesh->max[1] - middle);
+}
+
+/* Oracle: rays. A wide light amid blockers: where the faces of the cube about it meet, at x or z = 12 on
+ * the slab, shadows are as right as elsewhere. */
+static void penumbras_cross_faces(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        struct shadow_scene scene = { .blockers = { { .mesh = NULL } } };
+        struct drawn drawn, open;
+        begin(&scene);
+        scene.test.objects[0].has_specular = false;
+        scene_add_point(&scene.test, 0, 12, 0, 1);
+        draw_lambert(&scene, &open);
+        flatten(add_blocker(&scene, IO_PRIMITIVE_SPHERE, 2.5, 6.5, 5, i == 1 ? 0.6 : 1));
+        flatten(add_blocker(&scene, IO_PRIMITIVE_CUBE, 1.5, -6, 6.5, 1));
+        scene.test.lights[0].size_mm = i == 2 ? 8 : 3;
+        draw_lambert(&scene, &drawn);
+        for (int k = 0; k < PIXELS; k++) {
+            const float *const p = drawn.position_mm + 4 * k;
+            for (int c = 0; c < 3; c++)
+                drawn.shadow[4 * k + c] /= open.shadow[4 * k + c] > 0 ? open.shadow[4 * k + c] : 1;
+            if (p[1] < -0.01f || drawn.normal[4 * k + 1] < 0.9f)
+                drawn.position_mm[4 * k + 3] = 0;
+        }
+        const struct deviation all = compare(&scene, &drawn, 512);
+        for (int k = 0; k < PIXELS; k++) {
+            const float *const p = drawn.position_mm + 4 * k;
+            if (fabsf(fmaxf(fabsf(p[0]), fabsf(p[2])) - 12) > 1.5f)
+                drawn.position_mm[4 * k + 3] = 0;
+        }
+        const struct deviation edge = compare(&scene, &drawn, 512);
+        print_message(
+            "  case %d: rmse %.4f, mean %+.4f, worst %.2f; at edges of faces %.4f, %+.4f, %.2f of %d\n", i,
+            all.rmse, all.bias, all.worst, edge.rmse, edge.bias, edge.worst, edge.count);
+        const double bound = i == 2 ? 0.04 : 0.016; /* before, 0.05 and 0.025 at the edges */
+        assert_true(edge.count > 300 && all.rmse < bound && edge.rmse < bound && fabs(edge.bias) < 0.006);
+        end_drawn(&drawn);
+        end_drawn(&open);
+        end(&scene);
+    }
+}
+
 /* Oracle: limits. As the light becomes a point, shadows become hard ones; as opacity goes, so does the
  * shadow; and what is all but opaque has the shadow of what is opaque, by other code. */
 static void limits_are_reached(void **state)
@@ -363,7 +433,7 @@ static void more_nodes_are_nearer(void **state)
 static void hard_cases_give_numbers(void **state)
 {
     (void)state;
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 9; i++) {
         struct shadow_scene scene = { .blockers = { { .mesh = NULL } } };
         begin(&scene);
         scene_add_point(&scene.test, 0, 80, 0, 1); /* so far away that one view holds all */
@@ -397,11 +467,16 @@ static void hard_cases_give_numbers(void **state)
         case 7: /* the receiver within a blocker */
             add_blocker(&scene, IO_PRIMITIVE_SPHERE, 10, 0, 0, 0.5);
             break;
+        case 8: /* a light as large as everything, amid all */
+            add_blocker(&scene, IO_PRIMITIVE_SPHERE, 2, 3, 9, 0.9);
+            scene.test.lights[0].position_mm[1] = 10;
+            scene.test.lights[0].size_mm = 1000;
+            break;
         }
         struct drawn drawn = draw_shadows(&scene, &usual);
         const float middle = drawn.shadow[4 * (HEIGHT / 2 * WIDTH + WIDTH / 2)];
         print_message("  case %d: %.3f in the middle\n", i, (double)middle);
-        static const double expected[8] = { 0.5, -1, 1, 1, -1, -1, -1, -1 };
+        static const double expected[9] = { 0.5, -1, 1, 1, -1, -1, -1, -1, -1 };
         if (expected[i] >= 0)
             assert_true(fabs((double)middle - expected[i]) < 0.01);
         end_drawn(&drawn);
@@ -453,6 +528,82 @@ static void ten_thousand_layers_are_all_counted(void **state)
     assert_true(count > 10);
     end_drawn(&drawn);
     end(&scene);
+}
+
+/* A wall that turns, a ball that waves and dust that drifts; JSON with other quotes. */
+static const char moving_scene[] =
+    "{'camera': {'eye': [2, 40, 30], 'target': [0, 0, 0], 'fov_y_deg': 35, 'size': [120, 90]},\n"
+    "'lights': [{'kind': 'point', 'position': [-5, 40, 8], 'size': 4}], 'frames': {'count': 10}, "
+    "'objects': [\n"
+    "{'primitive': 'slab', 'detail': 8, 'transform': {'scale': 20}, 'material': {'name': 'm', 'eta': 1.5,\n"
+    "'sigma_a_per_mm': [0, 0, 0], 'sigma_s_prime_per_mm': [2, 2, 2]}},\n"
+    "{'opacity': 1, 'primitive': 'cube', 'detail': 4, 'transform': {'scale': [3, 1, 1], 'translate': [0, "
+    "4, 5]},\n"
+    "'motion': {'turn_deg': 180, 'translate': [5, 0, 0]}},\n"
+    "{'opacity': [0.2, 0.5, 0.9], 'primitive': 'sphere', 'detail': 64, 'transform': {'scale': 3,\n"
+    "'translate': [0, 9, 0]}, 'deform': [{'kind': 'wave', 'amplitude': 2, 'wavelength': 6, 'cycles': "
+    "1}]},\n"
+    "{'opacity': 0.5, 'particles': {'count': 100, 'radius': 0.06}, 'transform': {'scale': 5,\n"
+    "'translate': [-9, 6, 0]}, 'motion': {'translate': [18, 0, 0]}}]}\n";
+
+static void write_moving(void)
+{
+    FILE *const file = fopen("scene.json", "w");
+    assert_non_null(file);
+    for (const char *c = moving_scene; *c; c++)
+        fputc(*c == '\'' ? '"' : *c, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* What blockers leave as they stand in a frame. */
+static struct drawn draw_frame(struct io_scene *scene, struct renderer *renderer, int frame)
+{
+    struct drawn drawn;
+    struct render_plan *plan;
+    dipole_status status;
+    const struct render_request request = {
+        .scene = scene, .media = renderer->media, .technique = RENDER_TECHNIQUE_LAMBERT, .epsilon = 0.01
+    };
+    io_scene_set_frame(scene, frame);
+    if (!render_run(renderer, &request, &plan, (double[RENDER_EFFECT_LIMIT]){ 0 }, &status))
+        fail_msg("%s", status.message);
+    drawn.shadow = read_texture(renderer, "shadow");
+    drawn.position_mm = read_texture(renderer, "position_mm");
+    drawn.normal = read_texture(renderer, "normal");
+    render_plan_destroy(plan);
+    return drawn;
+}
+
+/* Oracle: a renderer that has drawn no other frame, bit for bit; and rays, which know of no renderer. */
+static void blockers_move(void **state)
+{
+    (void)state;
+    static const int frames[] = { 0, 5, 2, 0 };
+    write_moving();
+    struct shadow_scene scene = { .blockers = { { .mesh = NULL } } };
+    struct io_scene *moving, *fresh;
+    struct renderer *renderer, *other;
+    assert_true(io_scene_read("scene.json", NULL, &moving, NULL));
+    assert_true(render_create(moving, RENDER_CONTEXT_DEFAULT, &renderer, NULL));
+    for (size_t f = 0; f < sizeof frames / sizeof *frames; f++) {
+        struct drawn drawn = draw_frame(moving, renderer, frames[f]);
+        assert_true(io_scene_read("scene.json", NULL, &fresh, NULL));
+        io_scene_set_frame(fresh, frames[f]);
+        assert_true(render_create(fresh, RENDER_CONTEXT_DEFAULT, &other, NULL));
+        struct drawn expected = draw_frame(fresh, other, frames[f]);
+        assert_memory_equal(drawn.shadow, expected.shadow, 4 * PIXELS * sizeof(float));
+        scene.test.scene = *fresh;
+        scene.test.lights[0] = fresh->lights[0];
+        const struct deviation found = compare(&scene, &drawn, 256);
+        print_message("  frame %d: rmse %.4f, mean %+.4f\n", frames[f], found.rmse, found.bias);
+        assert_true(found.rmse < 0.04 && fabs(found.bias) < 0.01); /* as of blockers at rest */
+        end_drawn(&expected);
+        end_drawn(&drawn);
+        render_destroy(other);
+        io_scene_destroy(fresh);
+    }
+    render_destroy(renderer);
+    io_scene_destroy(moving);
 }
 
 /* Oracle: the reference's picture. Light that soft coloured shadows leave enters, and spreads: by gathering
@@ -583,11 +734,13 @@ int main(void)
         cmocka_unit_test(hard_shadows_are_where_rays_say),
         cmocka_unit_test(extinction_follows_the_way),
         cmocka_unit_test(penumbras_are_near_those_of_rays),
+        cmocka_unit_test(penumbras_cross_faces),
         cmocka_unit_test(limits_are_reached),
         cmocka_unit_test(more_nodes_are_nearer),
         cmocka_unit_test(hard_cases_give_numbers),
         cmocka_unit_test(ten_thousand_layers_are_all_counted),
         cmocka_unit_test(spots_light_their_cone),
+        cmocka_unit_test(blockers_move),
         cmocka_unit_test(what_is_left_enters_and_spreads),
         cmocka_unit_test(light_enters_in_penumbras_of_objects),
     };

@@ -26,6 +26,28 @@ static void primitives_are_solid(void **state)
     }
 }
 
+/* Oracle: docs/formats.md: of the primitives balls, cubes and slabs are convex; a dent of a hundredth, or
+ * two parts, are not. */
+static void some_primitives_are_convex(void **state)
+{
+    (void)state;
+    struct io_mesh *mesh;
+    for (int i = 0; i < IO_PRIMITIVE_COUNT; i++) {
+        bool is_convex = false;
+        assert_true(io_mesh_create_primitive((enum io_primitive)i, 24, &mesh, NULL));
+        assert_true(render_mesh_is_convex(mesh, &is_convex, NULL));
+        if (is_convex != (i == IO_PRIMITIVE_SPHERE || i == IO_PRIMITIVE_CUBE || i == IO_PRIMITIVE_SLAB))
+            fail_msg("%s", io_primitive_names[i]);
+        if (i == IO_PRIMITIVE_SPHERE) {
+            for (size_t k = 0; k < 3; k++)
+                mesh->positions[3 * (size_t)mesh->indices[600] + k] *= 0.99f;
+            assert_true(render_mesh_is_convex(mesh, &is_convex, NULL));
+            assert_false(is_convex);
+        }
+        io_mesh_destroy(mesh);
+    }
+}
+
 /* Oracle: without any one of its triangles, or with it turned, a closed surface is not closed. */
 static void one_triangle_makes_the_difference(void **state)
 {
@@ -95,6 +117,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(primitives_are_solid),
+        cmocka_unit_test(some_primitives_are_convex),
         cmocka_unit_test(one_triangle_makes_the_difference),
         cmocka_unit_test(every_part_counts),
     };

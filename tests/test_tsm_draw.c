@@ -363,6 +363,31 @@ static void layers_find_the_air_of_hollow_objects(void **state)
 
 /* ---- volumes ------------------------------------------------------------------------------------ */
 
+/* Oracle: a renderer of its own. Volumes with another number of samples may come to lie where others were.
+ */
+static void samples_may_change_from_picture_to_picture(void **state)
+{
+    (void)state;
+    static const int counts[] = { 13, 21, 53, 21, 13, 53, 13 };
+    struct test_scene test;
+    const struct io_material material = marble();
+    init(&test, IO_PRIMITIVE_SPHERE, 32, 8, &material);
+    scene_add_directional(&test, -1, -1, -1, 3);
+    struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        const struct render_options options = { .technique = RENDER_TECHNIQUE_TSM,
+                                                .tsm = { .sample_count = counts[i] } };
+        struct io_image *const expected = draw_once(&test, &options, NULL), *const found = draw(
+                                                                                renderer, &options, NULL);
+        assert_memory_equal(found->pixels, expected->pixels,
+                            sizeof(float) * 4 * (size_t)found->width_px * (size_t)found->height_px);
+        io_image_destroy(expected);
+        io_image_destroy(found);
+    }
+    render_destroy(renderer);
+    scene_end(&test);
+}
+
 /* Oracle: the same volume, baked in memory. A volume of another medium, or none, is refused. */
 static void volumes_of_a_folder_are_used(void **state)
 {
@@ -418,6 +443,7 @@ int main(void)
         cmocka_unit_test(nothing_leaks_into_an_object_that_touches),
         cmocka_unit_test(a_far_point_light_is_directional),
         cmocka_unit_test(layers_find_the_air_of_hollow_objects),
+        cmocka_unit_test(samples_may_change_from_picture_to_picture),
         cmocka_unit_test(volumes_of_a_folder_are_used),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -37,15 +37,15 @@ static const char script[] =
     "key Tab; settle 'gather, 640x800' opened.png\n"
     "click 225 129; click 170 192; to 600 700; settle 'lambert, 640x800' lambert.png\n"
     "click 225 129; click 170 154; to 600 700; settle 'gather, 640x800' again.png\n"
-    "drag 175 422 200 422; to 600 700; settle 'gather, 640x800' edited.png\n"
+    "drag 175 447 200 447; to 600 700; settle 'gather, 640x800' edited.png\n"
     "key c; settle 'gather, 640x800' split.png\n"
     "drag 670 400 500 400; to 600 700; settle 'gather, 640x800' moved.png\n"
     "key c; settle 'gather, 640x800' difference.png\n"
     "key c; settle 'gather, 640x800' alone.png\n"
     "rmdir folder; key s; settle 'gather, 640x800' failed.png; mkdir folder\n"
-    "click 100 329; click 100 404\n" /* close Material, open Save */
-    "click 140 479; until_true test -s panel_view.json\n"
-    "click 50 479; until_true test -s folder/saved.png\n"
+    "click 100 354; click 100 429\n" /* close Material, open Save */
+    "click 140 504; until_true test -s panel_view.json\n"
+    "click 50 504; until_true test -s folder/saved.png\n"
     "to 600 600\n"
     "drag 600 600 680 600; sleep 1; settle 'gather, 640x800' turned.png\n"
     "key q || true\n" /* its key-up may find no window left */

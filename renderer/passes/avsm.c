@@ -5,6 +5,7 @@
 #include "renderer/shadow_draw.h"
 
 #include <limits.h>
+#include <stdio.h>
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
@@ -13,26 +14,38 @@ static struct render_decision decide(const struct render_request *request, const
     const struct render_plan_shadows *const shadows = &plan->shadows;
     (void)request;
     if (shadows->translucent_count == 0)
-        return render_not_called_for(shadows->blocker_count > 0 ? "all blockers are opaque"
-                                                                : "nothing but objects blocks");
+        return render_not_called_for(
+            "%s%s%s", shadows->blocker_count > 0 ? "all blockers are opaque" : "nothing but objects blocks",
+            shadows->casters.opaque_reason[0] ? ": " : "", shadows->casters.opaque_reason);
     if (!shadows->of_view)
         return render_not_called_for("no light shines");
-    if (shadows->node_limit == INT_MAX)
-        return render_called_for("%zu of %zu blockers let light through; all nodes are kept",
-                                 shadows->translucent_count, shadows->blocker_count);
-    return render_called_for("%zu of %zu blockers let light through; %d nodes", shadows->translucent_count,
-                             shadows->blocker_count, shadows->node_limit);
+    if (render_plan_shades_maps_alone(plan))
+        return render_not_called_for("translucent shadow maps have their own");
+    char nodes[32] = "all nodes are kept", objects[64] = "";
+    if (shadows->node_limit < INT_MAX)
+        snprintf(nodes, sizeof nodes, "%d nodes", shadows->node_limit);
+    if (shadows->object_count > 0)
+        snprintf(objects, sizeof objects, ", %zu object%s up to %.2g of it", shadows->object_count,
+                 shadows->object_count == 1 ? "" : "s", shadows->casters.most_left);
+    return render_called_for("%zu of %zu blockers let light through%s; %s",
+                             shadows->translucent_count - shadows->object_count, shadows->blocker_count,
+                             objects, nodes);
 }
 
-/* Four surfaces in each texel, of half the map. */
 static double cost_ms(const struct render_plan *plan)
 {
-    const double texels = (double)plan->shadows.size_px * plan->shadows.size_px;
-    return RENDER_COST_PROGRAM_MS +
-           (double)plan->view_count *
-               render_cost_ms(1, RENDER_COST_TRIANGLE * (double)plan->shadows.triangle_count +
-                                     RENDER_COST_BLOCKER_SURFACE * 2 * texels +
-                                     RENDER_COST_VIEW_TEXEL * texels);
+    const struct render_plan_shadows *const shadows = &plan->shadows;
+    const double texels = (double)shadows->size_px * shadows->size_px;
+    double ms = 0;
+    for (size_t i = 0; i < plan->view_count; i++) {
+        if (!plan->views[i].is_repeated)
+            ms +=
+                render_cost_ms(1, RENDER_COST_BLOCKER_TRIANGLE * (double)(shadows->triangle_count -
+                                                                          shadows->opaque_triangle_count) +
+                                      RENDER_COST_BLOCKER_SURFACE * shadows->of_view[i].surface_count +
+                                      RENDER_COST_CURVE_TEXEL * texels);
+    }
+    return ms;
 }
 
 static const struct render_pass passes[] = {
@@ -61,8 +74,9 @@ static struct render_decision decide_colour(const struct render_request *request
                                                                          : "no blocker lets light through");
     if (!plan->shadows.of_view)
         return render_not_called_for("no light shines");
-    return render_called_for("channels of %zu of %zu blockers differ", plan->shadows.coloured_count,
-                             plan->shadows.blocker_count);
+    return render_called_for("channels of %zu of %zu blockers and objects differ",
+                             plan->shadows.coloured_count,
+                             plan->shadows.blocker_count + plan->shadows.object_count);
 }
 
 static double cost_colour_ms(const struct render_plan *plan)

@@ -14,7 +14,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+    return render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
            render_cost_ms(RENDER_COST_COMPOSITE_PIXEL, plan->covered_px);
 }
 

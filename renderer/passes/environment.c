@@ -1,5 +1,5 @@
 /* Light from all around: irradiance that enters by the normal, as a sum of spherical harmonics (theory.md
- * T50 to T52). Its samples and its pixels are effects of their own. */
+ * T50 to T52), tabulated by the normal (T47). Its samples and its pixels are effects of their own. */
 #include "renderer/cost.h"
 #include "renderer/effects.h"
 #include "renderer/environment_draw.h"
@@ -22,11 +22,12 @@ static struct render_decision decide(const struct render_request *request, const
                              plan->environment_order, plan->environment_error);
 }
 
-/* Each time that the shaders' copy is made. */
+/* Of tables made anew: they are kept while the light, its epsilon and the media are the same. */
 static double cost_ms(const struct render_plan *plan)
 {
-    const double count = (plan->environment_order + 1.0) * (plan->environment_order + 2.0);
-    return render_cost_ms(RENDER_COST_HARMONIC, count * (double)plan->media->object_count);
+    const double threads_ms = 0.2;
+    return threads_ms + render_cost_ms(RENDER_COST_SKY_NODE, plan->irradiance_nodes) +
+           render_cost_ms(RENDER_COST_SKY_TERM, plan->irradiance_terms);
 }
 
 static double error(const struct render_plan *plan)
@@ -37,8 +38,8 @@ static double error(const struct render_plan *plan)
 static const struct render_pass passes[] = {
     { .name = "environment",
       .draw = RENDER_DRAW_NOTHING,
-      .writes = { "environment_harmonics" },
-      .run = render_sky_upload },
+      .writes = { "environment_irradiance" },
+      .run = render_sky_tabulate },
 };
 
 const struct render_effect render_effect_environment = {

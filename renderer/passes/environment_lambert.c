@@ -12,22 +12,20 @@ static struct render_decision decide(const struct render_request *request, const
         return render_not_called_for("no environment is drawn");
     if (plan->technique != RENDER_TECHNIQUE_LAMBERT)
         return render_not_called_for("technique is %s", render_technique_names[plan->technique]);
-    return render_called_for("%d harmonics at each pixel",
-                             (plan->environment_order + 1) * (plan->environment_order + 1));
+    return render_called_for("irradiance by the normal at each pixel, from a table");
 }
 
 static double cost_ms(const struct render_plan *plan)
 {
-    const double count = 0.5 * (plan->environment_order + 1.0) * (plan->environment_order + 2.0);
-    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
-           render_cost_ms(RENDER_COST_HARMONIC_PIXEL * count, plan->covered_px);
+    return render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+           render_cost_ms(RENDER_COST_SKY_PIXEL, plan->covered_px);
 }
 
 static const struct render_pass passes[] = {
     { .name = "environment_lambert",
       .draw = RENDER_DRAW_FULLSCREEN,
       .is_added = true,
-      .reads = { "position_mm", "normal", "environment_harmonics" },
+      .reads = { "position_mm", "normal", "environment_irradiance" },
       .reads_if_written = { "object_media" },
       .writes = { "radiosity" },
       .bind = render_sky_bind },

@@ -21,13 +21,9 @@ static struct render_decision decide(const struct render_request *request, const
                              request->environment_samples == RENDER_ENVIRONMENT_PEEL ? "y" : "x, y and z");
 }
 
-/* Of an object with three layers along each of three axes. */
 static double cost_ms(const struct render_plan *plan)
 {
-    const double layers = 9, texels = (double)plan->peel_side_px * plan->peel_side_px;
-    return RENDER_COST_PROGRAM_MS + render_cost_sky_samples_ms(plan) +
-           layers * (render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
-                     render_cost_ms(RENDER_COST_VIEW_TEXEL + RENDER_COST_READ_TEXEL, texels));
+    return render_cost_sky_peel_ms(plan);
 }
 
 /* Nothing bounds what surfaces along the one axis are missed. */
@@ -40,6 +36,7 @@ static double error(const struct render_plan *plan)
 static const struct render_pass passes[] = {
     { .name = "environment_peel",
       .draw = RENDER_DRAW_BY_RUN,
+      .reads = { "environment_irradiance" },
       .writes = { "peel_position_mm", "peel_normal", "light_samples" },
       .depth_written = "peel_depth",
       .run = render_sky_peel },

@@ -25,6 +25,7 @@ static double cost_ms(const struct render_plan *plan)
 static const struct render_pass passes[] = {
     { .name = "environment_samples",
       .draw = RENDER_DRAW_NOTHING,
+      .reads = { "environment_irradiance" },
       .writes = { "light_samples" },
       .run = render_sky_sample },
 };

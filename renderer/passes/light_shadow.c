@@ -22,17 +22,22 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    const double taps = plan->shadows.soft_light_count > 0 ? 2.0 * plan->shadows.tap_count : 16;
-    const double block = render_plan_shadow_block_px(plan);
-    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_SCREEN_PIXEL + RENDER_COST_SHADOW_TAP * taps,
-                                                   render_cost_view_texels(plan) / (block * block));
+    const double block_px = render_plan_shadow_block_px(plan);
+    double ms = 0;
+    for (size_t i = 0; i < plan->view_count; i++) {
+        const double side = plan->views[i].size_px / block_px;
+        ms += render_cost_ms(RENDER_COST_SHADOW_BLOCK, side * side) +
+              render_cost_shadow_points_ms(plan, i, side * side);
+    }
+    return ms;
 }
 
 static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
     render_set_int(frame->program, "light_block_px", render_plan_shadow_block_px(frame->plan));
-    render_set_shadow(frame);
+    render_set_shadow(frame, &frame->view->projection,
+                      (double)frame->view->size_px / render_plan_shadow_block_px(frame->plan));
 }
 
 static const struct render_pass passes[] = {

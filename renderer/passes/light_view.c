@@ -15,7 +15,9 @@ static struct render_decision decide(const struct render_request *request, const
     if (plan->technique == RENDER_TECHNIQUE_TSM && !plan->has_specular)
         return render_not_called_for("translucent shadow maps are seen instead");
     if (plan->has_light_pictures)
-        return render_not_called_for("what parallel light sees is drawn in memory, for samples alone");
+        return render_not_called_for(
+            "%zu view%s of up to %d texels a side drawn in memory, for samples alone", plan->view_count,
+            plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
     return render_called_for("%zu of %zu lights shine, seen in %zu view%s of up to %d texels a side",
                              plan->lit_count, request->scene->light_count, plan->view_count,
                              plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
@@ -23,8 +25,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS +
-           (double)plan->view_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
+    return (double)plan->view_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
            render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_view_texels(plan));
 }
 
@@ -36,6 +37,7 @@ static void bind(const struct render_frame *frame)
     render_set_light(frame->program, light);
     render_set_vec3(frame->program, "forward_ws", view->projection.forward);
     render_set_float(frame->program, "texel_area", view->texel_area);
+    render_set_int(frame->program, "light_layer", view->layer);
 }
 
 static const struct render_pass passes[] = {
@@ -43,6 +45,7 @@ static const struct render_pass passes[] = {
       .draw = RENDER_DRAW_SCENE,
       .is_per_view = true,
       .is_of_samples = true,
+      .reads_if_written = { "light_front" },
       .writes = { "light_view" },
       .writes_if_wanted = { "light_object", "light_irradiance", "light_rest" },
       .depth_written = "light_depth",

@@ -50,14 +50,12 @@ static struct render_decision decide_motion(const struct render_request *request
 /* What the processor poses for bounds and areas, once a frame is set, is not in it. */
 static double deform_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS +
-           render_cost_ms(RENDER_COST_DEFORMED_VERTEX, (double)plan->deformed_vertex_count);
+    return render_cost_ms(RENDER_COST_DEFORMED_VERTEX, (double)plan->deformed_vertex_count);
 }
 
 static double motion_ms(const struct render_plan *plan)
 {
-    const double program_ms = plan->deformed_vertex_count > 0 ? 0 : RENDER_COST_PROGRAM_MS; /* shared */
-    return program_ms + render_cost_ms(RENDER_COST_MOVED_VERTEX, (double)plan->moved_vertex_count);
+    return render_cost_ms(RENDER_COST_MOVED_VERTEX, (double)plan->moved_vertex_count);
 }
 
 static bool pose_deformed(const struct render_frame *frame, dipole_status *status)

@@ -21,7 +21,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return 2 * RENDER_COST_PROGRAM_MS + render_cost_splats_ms(plan);
+    return render_cost_splats_ms(plan);
 }
 
 /* Samples of other views have counters of their own. */

@@ -21,16 +21,19 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    const double taps = plan->shadows.soft_light_count > 0 ? 2.0 * plan->shadows.tap_count : 16;
-    return RENDER_COST_PROGRAM_MS +
-           (double)plan->view_count * (render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
-                                       render_cost_ms(RENDER_COST_SHADOW_TAP * taps, plan->covered_px));
+    double ms = 0;
+    for (size_t i = 0; i < plan->view_count; i++) {
+        if (!plan->views[i].is_repeated)
+            ms += render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
+                  render_cost_shadow_points_ms(plan, i, plan->covered_px);
+    }
+    return ms;
 }
 
 static void bind(const struct render_frame *frame)
 {
     render_set_light_view(frame->program, frame->request, frame->view);
-    render_set_shadow(frame);
+    render_set_shadow(frame, &frame->plan->camera, frame->plan->width_px);
 }
 
 static const struct render_pass passes[] = {

@@ -11,22 +11,30 @@ static struct render_decision decide(const struct render_request *request, const
     const struct render_plan_shadows *const shadows = &plan->shadows;
     (void)request;
     if (!shadows->is_called_for)
-        return render_not_called_for("no blocker, no spot, and no light has a size: lights' views do");
+        return render_not_called_for("no blocker, no spot, no light has a size: lights' views do%s%s",
+                                     shadows->casters.opaque_reason[0] ? "; " : "",
+                                     shadows->casters.opaque_reason);
     if (!shadows->of_view)
         return render_not_called_for("no light shines");
-    return render_called_for("%zu blocker%s, %zu light%s with a size, %zu spot%s: %d texels a side",
-                             shadows->blocker_count, shadows->blocker_count == 1 ? "" : "s",
-                             shadows->soft_light_count, shadows->soft_light_count == 1 ? "" : "s",
-                             shadows->spot_count, shadows->spot_count == 1 ? "" : "s", shadows->size_px);
+    if (render_plan_shades_maps_alone(plan))
+        return render_not_called_for("translucent shadow maps have their own");
+    return render_called_for(
+        "%zu blocker%s, %zu object%s that let light through, %zu light%s with a size, %zu "
+        "spot%s: %d texels a side",
+        shadows->blocker_count, shadows->blocker_count == 1 ? "" : "s", shadows->object_count,
+        shadows->object_count == 1 ? "" : "s", shadows->soft_light_count,
+        shadows->soft_light_count == 1 ? "" : "s", shadows->spot_count, shadows->spot_count == 1 ? "" : "s",
+        shadows->size_px);
 }
 
 static double cost_ms(const struct render_plan *plan)
 {
     const double texels = (double)plan->shadows.size_px * plan->shadows.size_px;
-    const double triangles = (double)(plan->triangle_count + plan->shadows.triangle_count);
-    return RENDER_COST_PROGRAM_MS +
-           (double)plan->view_count *
-               render_cost_ms(1, RENDER_COST_TRIANGLE * triangles + RENDER_COST_VIEW_TEXEL * texels);
+    return (double)render_plan_shadow_map_count(plan) *
+           render_cost_ms(1,
+                          RENDER_COST_TRIANGLE * (double)plan->triangle_count +
+                              RENDER_COST_BLOCKER_TRIANGLE * (double)plan->shadows.opaque_triangle_count +
+                              RENDER_COST_SHADOW_TEXEL * texels);
 }
 
 static const struct render_pass passes[] = {

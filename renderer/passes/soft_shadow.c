@@ -44,14 +44,15 @@ static struct render_decision decide_nearest(const struct render_request *reques
                                              const struct render_plan *plan)
 {
     const struct render_decision soft = decide(request, plan);
+    if (soft.is_active && render_plan_shades_maps_alone(plan))
+        return render_not_called_for("translucent shadow maps have their own");
     return soft.is_active ? render_called_for("penumbras are not looked for where nothing blocks") : soft;
 }
 
 static double cost_nearest_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS +
-           (double)plan->view_count * render_cost_ms(RENDER_COST_SCREEN_PIXEL,
-                                                     (double)plan->shadows.size_px * plan->shadows.size_px);
+    const double texels = (double)plan->shadows.size_px * plan->shadows.size_px;
+    return (double)render_plan_shadow_map_count(plan) * render_cost_ms(RENDER_COST_SHADOW_TEXEL, texels);
 }
 
 static const struct render_pass nearest_passes[] = {
@@ -60,7 +61,8 @@ static const struct render_pass nearest_passes[] = {
       .is_per_view = true,
       .reads = { "shadow_depth_mm" },
       .reads_if_written = { "avsm_ranges" },
-      .writes = { "shadow_nearest" } },
+      .writes = { "shadow_nearest" },
+      .bind = render_shadow_bind_nearest },
     { .name = "shadow_reach",
       .draw = RENDER_DRAW_NOTHING,
       .is_per_view = true,

@@ -28,7 +28,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS + render_cost_splats_ms(plan);
+    return render_cost_splats_ms(plan);
 }
 
 static double error(const struct render_plan *plan)

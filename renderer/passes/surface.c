@@ -15,8 +15,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return 3 * RENDER_COST_PROGRAM_MS +
-           render_cost_ms(RENDER_COST_TRIANGLE_4, (double)plan->triangle_count) +
+    return render_cost_ms(RENDER_COST_TRIANGLE_4, (double)plan->triangle_count) +
            render_cost_ms(RENDER_COST_EMPTY_PIXEL, render_cost_pixels(plan)) +
            render_cost_ms(RENDER_COST_SURFACE_PIXEL, plan->covered_px);
 }

@@ -22,7 +22,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS + render_cost_map_samples_ms(plan, render_cost_map_pixels(plan));
+    return render_cost_map_samples_ms(plan, render_cost_map_pixels(plan));
 }
 
 /* Nothing bounds what so few samples make of an arbitrary shape. */

@@ -17,8 +17,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS + RENDER_COST_LEVELS_MS +
-           (double)plan->map_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
+    return (double)plan->map_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
            render_cost_ms(RENDER_COST_MAP_TEXEL, render_cost_map_texels(plan));
 }
 
@@ -42,6 +41,7 @@ const struct render_effect render_effect_tsm_light = {
     .source = "Dachsbacher and Stamminger 2003, section 3",
     .decide = decide,
     .cost_ms = cost_ms,
+    .start_ms = RENDER_COST_LEVELS_MS,
     .passes = passes,
     .pass_count = COUNT(passes),
 };

@@ -21,8 +21,7 @@ enum { CELLS = LUT_TSM_LOCAL_SIDE * LUT_TSM_LOCAL_SIDE + 5 };
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS +
-           render_cost_ms(RENDER_COST_MAP_CELL, CELLS * render_cost_map_pixels(plan));
+    return render_cost_ms(RENDER_COST_MAP_CELL, CELLS * render_cost_map_pixels(plan));
 }
 
 static void bind(const struct render_frame *frame)

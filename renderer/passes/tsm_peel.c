@@ -20,10 +20,9 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return RENDER_COST_PROGRAM_MS +
-           plan->tsm.layer_count * ((double)plan->map_count *
-                                        render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
-                                    render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_map_texels(plan)));
+    return plan->tsm.layer_count *
+           ((double)plan->map_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
+            render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_map_texels(plan)));
 }
 
 static const struct render_pass passes[] = {

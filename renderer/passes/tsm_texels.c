@@ -23,7 +23,7 @@ static double cost_ms(const struct render_plan *plan)
     for (size_t i = 0; i < plan->map_count; i++)
         count +=
             plan->objects[plan->maps[i].object].pixel_count * plan->maps[i].size_px * plan->maps[i].size_px;
-    return RENDER_COST_PROGRAM_MS + render_cost_ms(RENDER_COST_MAP_EVALUATION, count);
+    return render_cost_ms(RENDER_COST_MAP_EVALUATION, count);
 }
 
 static void bind(const struct render_frame *frame)

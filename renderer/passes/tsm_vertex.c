@@ -21,8 +21,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return 3 * RENDER_COST_PROGRAM_MS +
-           render_cost_map_samples_ms(plan, (double)plan->vertex_count * (double)plan->map_count) +
+    return render_cost_map_samples_ms(plan, (double)plan->vertex_count * (double)plan->map_count) +
            render_cost_ms(RENDER_COST_TRIANGLE_4, (double)plan->triangle_count) +
            render_cost_ms(RENDER_COST_POINTS_PIXEL, render_cost_pixels(plan));
 }

@@ -1,5 +1,5 @@
 // Pass environment_lambert: radiosity += total reflectance times the irradiance that enters from all around.
-#include "common/harmonics.glsl"
+#include "common/irradiance.glsl"
 #include "common/medium.glsl"
 uniform sampler2D position_mm;
 uniform sampler2D normal;

@@ -32,9 +32,25 @@ layout(location = 1) out float light_irradiance;
 in vec3 rest_mm;
 layout(location = REST_LOCATION) out vec4 light_rest;  // where the surface is when the object is at rest
 #endif
+#ifdef HAS_LIGHT_FRONT
+uniform sampler2D light_front;  // what the view before has shown
+uniform int light_layer;        // 0: nothing is in front
+
+// Whether the surface is behind that, and can be lit: theory.md T71.
+bool is_of_layer()
+{
+    vec3 front_mm = texelFetch(light_front, ivec2(gl_FragCoord.xy), 0).xyz;
+    float scale_mm = light.w > 0.0 ? distance(light.xyz, position_ws_mm) : length(position_ws_mm);
+    return gl_FrontFacing && dot(position_ws_mm - front_mm, forward_ws) > 1e-5 * scale_mm;
+}
+#endif
 
 void main()
 {
+#ifdef HAS_LIGHT_FRONT
+    if (light_layer > 0 && !is_of_layer())
+        discard;
+#endif
     vec3 to_light = toward(light, position_ws_mm);
     float cosine = clamp(dot(unit_or(normal_ws, to_light), to_light), 0.0, 1.0);
     float axis_cosine = light.w > 0.0 ? -dot(to_light, forward_ws) : 1.0;

@@ -84,16 +84,12 @@ static void keep(const struct window *window, struct window_side *side, int widt
 static bool draw_side(struct window *window, struct window_side *side, dipole_status *status)
 {
     const struct io_camera *const camera = &window->scene->camera;
-    const struct render_request request = { .scene = window->scene,
-                                            .technique = side->technique,
-                                            .epsilon = side->epsilon,
-                                            .area = window->drawing.area,
-                                            .tsm = window->drawing.tsm,
-                                            .shadows = window->drawing.shadows,
-                                            .media = window->renderer->media,
-                                            .tables = window->drawing.tables,
-                                            .volumes = window->drawing.volumes,
-                                            .is_tone_mapped = true };
+    struct render_options drawing = window->drawing;
+    drawing.technique = side->technique;
+    drawing.epsilon = side->epsilon;
+    drawing.budget_ms = window_predicts_error(side->technique) ? side->budget_ms : 0;
+    drawing.is_tone_mapped = true;
+    const struct render_request request = render_request_for(window->renderer, &drawing);
     double time_ms[RENDER_EFFECT_LIMIT];
     struct render_plan *plan = NULL;
     const double start_s = glfwGetTime();
@@ -102,6 +98,8 @@ static bool draw_side(struct window *window, struct window_side *side, dipole_st
     side->time_ms = (glfwGetTime() - start_s) * 1e3;
     render_fill_report(window->renderer, plan, time_ms, &side->report);
     side->report.total_ms = side->time_ms;
+    if (plan->budget_ms > 0)
+        side->epsilon = plan->epsilon;
     render_plan_destroy(plan);
     keep(window, side, camera->width_px, camera->height_px);
     return render_gl_check(&window->renderer->errors, "keeping a picture", status);

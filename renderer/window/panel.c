@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const struct gui_range budget_range = { 10, 10000, true, "%.0f ms" };
 static const struct gui_range epsilon_range = { 1e-4, RENDER_EPSILON_MAX, true, "%.3g" };
 static const struct gui_range exposure_range = { -10, 10, false, "%+.1f EV" };
 
@@ -91,8 +92,18 @@ static void show_head(const struct window *window)
         gui_text(GUI_WARNING, report->notes[i]);
 }
 
-static void show_side(struct window *window, struct window_side *side, const char *technique_label,
-                      const char *epsilon_label)
+bool window_predicts_error(enum render_technique technique)
+{
+    return technique == RENDER_TECHNIQUE_AUTO || technique == RENDER_TECHNIQUE_GATHER ||
+           technique == RENDER_TECHNIQUE_SPLAT;
+}
+
+/* What the sliders of a side are called. */
+struct side_labels {
+    const char *technique, *epsilon, *is_timed, *budget;
+};
+
+static void show_side(struct window *window, struct window_side *side, const struct side_labels *labels)
 {
     enum render_technique techniques[WINDOW_TECHNIQUE_LIMIT];
     const char *names[WINDOW_TECHNIQUE_LIMIT];
@@ -100,11 +111,24 @@ static void show_side(struct window *window, struct window_side *side, const cha
     size_t index = 0;
     while (index + 1 < count && techniques[index] != side->technique)
         index++;
-    if (gui_choice(technique_label, names, count, &index)) {
+    if (gui_choice(labels->technique, names, count, &index)) {
         side->technique = techniques[index];
         window_touch(window);
     }
-    if (gui_slider(epsilon_label, &epsilon_range, &side->epsilon))
+    const bool is_predicted = window_predicts_error(side->technique);
+    bool is_timed = is_predicted && side->budget_ms > 0;
+    gui_disabled_begin(is_timed); /* it is chosen */
+    if (gui_slider(labels->epsilon, &epsilon_range, &side->epsilon))
+        window_touch(window);
+    gui_disabled_end();
+    if (!is_predicted)
+        return;
+    if (gui_check(labels->is_timed, &is_timed)) {
+        side->budget_ms = is_timed ? fmin(fmax(side->time_ms, budget_range.min), budget_range.max) : 0;
+        window_touch(window);
+    }
+    gui_tip("Choose the least \u03b5 that is predicted to take no longer");
+    if (is_timed && gui_slider(labels->budget, &budget_range, &side->budget_ms))
         window_touch(window);
 }
 
@@ -112,7 +136,8 @@ static void show_technique(struct window *window)
 {
     if (!gui_section("Technique", true))
         return;
-    show_side(window, &window->sides[0], "technique", "\u03b5 (error)");
+    static const struct side_labels labels = { "technique", "\u03b5 (error)", "\u03b5 by time", "time" };
+    show_side(window, &window->sides[0], &labels);
     if (gui_slider("exposure", &exposure_range, &window->scene->exposure_ev))
         window_touch(window);
 }
@@ -128,7 +153,8 @@ static void show_comparison(struct window *window)
         window_touch(window);
     }
     gui_disabled_begin(window->comparison == WINDOW_ALONE);
-    show_side(window, &window->sides[1], "right", "right \u03b5");
+    static const struct side_labels labels = { "right", "right \u03b5", "right by time", "right time" };
+    show_side(window, &window->sides[1], &labels);
     gui_disabled_end();
     char text[96] = "\u2013";
     if (window->has_difference)

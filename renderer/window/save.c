@@ -39,7 +39,8 @@ void window_save_picture(struct window *window)
     struct render_options drawing = window->drawing;
     dipole_status status = { .code = DIPOLE_OK };
     drawing.technique = window->sides[0].technique;
-    drawing.epsilon = window->sides[0].epsilon;
+    drawing.epsilon = window->sides[0].epsilon; /* also that which was chosen */
+    drawing.budget_ms = 0;
     snprintf(done, sizeof done, "Saved %s", window->panel.picture_path);
     if (render_output_write(window->renderer, &drawing, window->panel.picture_path, NULL, &status))
         window_tell(window, done, NULL);

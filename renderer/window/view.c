@@ -316,7 +316,9 @@ bool render_view(struct renderer *renderer, struct io_scene *scene,
                  const struct render_view_options *options, dipole_status *status)
 {
     const struct window_side side = { .technique = options->drawing.technique,
-                                      .epsilon = options->drawing.epsilon };
+                                      .epsilon = options->drawing.epsilon > 0 ? options->drawing.epsilon
+                                                                              : RENDER_EPSILON_DEFAULT,
+                                      .budget_ms = options->drawing.budget_ms };
     struct window window = { .renderer = renderer,
                              .scene = scene,
                              .options = options,

@@ -13,6 +13,7 @@ enum { WINDOW_HISTORY = 96, WINDOW_TECHNIQUE_LIMIT = 16, WINDOW_PATH_SIZE = 1024
 struct window_side {
     enum render_technique technique;
     double epsilon;
+    double budget_ms;         /* that epsilon is chosen for; 0: it is set by hand */
     GLuint display, radiance; /* textures, 0: none yet */
     int width_px, height_px;
     struct render_report report;
@@ -114,6 +115,9 @@ void window_lights_show(struct window *window);
 
 /* What stands over the picture: names, divider, scale. */
 void window_marks_show(struct window *window);
+
+/* Whether the technique says what it errs by and takes, so that one can be chosen by the other. */
+bool window_predicts_error(enum render_technique technique);
 
 /* Techniques that a window can draw; returns how many. */
 size_t window_list_techniques(enum render_technique techniques[WINDOW_TECHNIQUE_LIMIT],

@@ -17,6 +17,11 @@ uniform int shadow_tap_count;
 uniform float shadow_light_size;    // diameter, mm; parallel light: of its disc at distance 1
 uniform float shadow_nearest_blocker_mm;
 uniform sampler2D shadow_nearest;
+#define TURN_OF_SURFACE 1           // shadow_turn_kind, as enum render_shadow_turn
+#define TURN_NONE 2
+uniform int shadow_turn_kind;
+uniform float shadow_pixel_mm;      // width of a pixel; perspective: w of the distance to
+uniform vec4 shadow_pixel_eye_mm;
 #endif
 // Channels are told apart only where blockers do.
 #ifdef HAS_AVSM_COLOUR
@@ -33,6 +38,8 @@ struct shadow_plane {
     float texel;       // width of a texel, in units of x and y
     vec3 slope;        // depth of the plane there: parallel: z + slope.xy (xy - place); point: 1/z = slope . (x, y, 1)
     float margin_mm;   // what is nearer to the surface is the surface itself
+    vec3 way, right;   // from the light to the surface, and across that, in the view; of a point both of length 1
+    float away_mm;     // how far, along the way
 };
 
 shadow_plane shadow_plane_at(vec3 position_ws_mm, vec3 normal_ws)
@@ -48,14 +55,19 @@ shadow_plane shadow_plane_at(vec3 position_ws_mm, vec3 normal_ws)
         plane.place = in_view.xy;
         n.z = min(n.z, -0.05);
         plane.slope = vec3(-n.xy / n.z, 0.0);
+        plane.way = vec3(0.0, 0.0, 1.0);
+        plane.away_mm = plane.depth_mm;
         cosine = -n.z;
     } else {
         plane.place = in_view.xy / plane.depth_mm;
         float height = min(dot(n, in_view), -0.05 * length(in_view));
         plane.slope = n / height;
         texel_mm *= plane.depth_mm;
-        cosine = -height / length(in_view);
+        plane.away_mm = length(in_view);
+        plane.way = in_view / plane.away_mm;
+        cosine = -height / plane.away_mm;
     }
+    plane.right = normalize(vec3(plane.way.z, 0.0, -plane.way.x));
     plane.margin_mm = texel_mm * (1.5 + 1.5 * sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine);
     return plane;
 }
@@ -214,7 +226,7 @@ shade shadow_hard(shadow_plane plane)
 }
 
 #ifdef HAS_SHADOW_TAPS
-// Width of the light seen over an edge at a depth, in units of x and y: T61.
+// Width of the light seen over an edge, both planes across the way: of a point in units of the distance. T61.
 float shadow_width(float receiver_mm, float blocker_mm)
 {
     float width = light.w == 0.0 ? receiver_mm - blocker_mm : 1.0 / blocker_mm - 1.0 / receiver_mm;
@@ -229,13 +241,36 @@ vec3 shadow_width(float receiver_mm, vec3 blocker_mm)
 }
 #endif
 
-// The nearest that may block within a radius, by blocks of texels; 0: nothing can.
-float shadow_nearest_mm(shadow_plane plane, float radius)
+// Where the way to a place of the light meets the view: offset is on the plane across the way at distance 1.
+vec2 shadow_place(shadow_plane plane, vec2 offset)
 {
-    float cut_mm = plane.depth_mm - plane.margin_mm, nearest_mm = cut_mm;
+    if (light.w == 0.0)
+        return plane.place + offset;
+    vec3 v = plane.way + offset.x * plane.right + offset.y * cross(plane.way, plane.right);
+    return v.xy / max(v.z, 1e-3);
+}
+
+// How deep something is along the way, for each mm along the view's axis.
+float shadow_steepness(shadow_plane plane, vec2 place)
+{
+    return light.w == 0.0 ? 1.0 : max(dot(vec3(place, 1.0), plane.way), 0.1);
+}
+
+// How far places of offsets within a radius are from the plane's.
+float shadow_reach(shadow_plane plane, float radius)
+{
+    if (light.w == 0.0)
+        return radius;
+    return radius * (1.0 + dot(plane.place, plane.place)) / max(1.0 - radius * length(plane.place), 0.1);
+}
+
+// How far away the nearest is that may block within a reach, by blocks of texels; 0: nothing can.
+float shadow_nearest_mm(shadow_plane plane, float reach)
+{
+    float cut_mm = plane.away_mm - plane.margin_mm, nearest_mm = cut_mm;
     ivec2 limit = textureSize(shadow_nearest, 0) - 1;
-    ivec2 low = clamp(shadow_texel(plane.place - radius) >> 4, ivec2(0), limit);
-    ivec2 high = clamp(shadow_texel(plane.place + radius) >> 4, ivec2(0), limit);
+    ivec2 low = clamp(shadow_texel(plane.place - reach) >> 4, ivec2(0), limit);
+    ivec2 high = clamp(shadow_texel(plane.place + reach) >> 4, ivec2(0), limit);
     for (int y = low.y; y <= high.y; y++) {
         for (int x = low.x; x <= high.x; x++) {
             float block_mm = texelFetch(shadow_nearest, ivec2(x, y), 0).r;
@@ -256,23 +291,24 @@ bool shadow_search(shadow_plane plane, float radius, vec2 turn, out shade mean_m
 {
     shade blocked = shade(0.0), moment = shade(0.0);
     for (int i = 0; i < shadow_tap_count; i++) {
-        vec2 place = plane.place + radius * shadow_tap(i, turn);
+        vec2 place = shadow_place(plane, radius * shadow_tap(i, turn));
         ivec2 texel = shadow_texel(place);
         if (!shadow_holds(texel))
             continue;
         float cut_mm = shadow_cut_mm(plane, place), opaque_mm = shadow_opaque_mm(texel);
-        shade left = shade(1.0);
+        shade left = shade(1.0), here_moment = shade(0.0);
 #ifdef HAS_AVSM_RANGES
         vec4 range = texelFetch(avsm_ranges, texel, 0);
         float end_mm = min(cut_mm, opaque_mm);
-        avsm_add_blocked(range, end_mm, blocked, moment);
+        avsm_add_blocked(range, end_mm, blocked, here_moment);
         if (opaque_mm < cut_mm)
             left = avsm_left(range, end_mm);
 #endif
         if (opaque_mm < cut_mm) {
             blocked += left;
-            moment += left * opaque_mm;
+            here_moment += left * opaque_mm;
         }
+        moment += here_moment * shadow_steepness(plane, place);
     }
     mean_mm = moment / max(blocked, shade(1e-20));
     return blocked != shade(0.0);
@@ -285,39 +321,49 @@ shade shadow_filter(shadow_plane plane, shade radius, vec2 turn)
         vec2 tap = shadow_tap(i, turn);
 #ifdef HAS_AVSM_COLOUR
         for (int c = 0; c < 3; c++) {
-            vec2 place = plane.place + radius[c] * tap;
+            vec2 place = shadow_place(plane, radius[c] * tap);
             sum[c] += shadow_left_at(shadow_texel(place), shadow_cut_mm(plane, place))[c];
         }
 #else
-        vec2 place = plane.place + radius * tap;
+        vec2 place = shadow_place(plane, radius * tap);
         sum += shadow_left_at(shadow_texel(place), shadow_cut_mm(plane, place));
 #endif
     }
     return sum / float(shadow_tap_count);
 }
 
-// A turn for each pixel, the same in every frame: interleaved gradient noise (Jimenez 2014).
-vec2 shadow_turn(vec2 pixel)
+// The taps' turn, 0 to 1: interleaved gradient noise of the pixel (Jimenez 2014), the same in every frame. For
+// comparison one of cells of space, 1 to 2 pixels wide; 0.37 keeps planes at whole numbers of mm off their sides.
+float shadow_turn_part(vec2 pixel, vec3 position_ws_mm)
 {
-    float angle = 6.28318530718 * fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
-    return vec2(cos(angle), sin(angle));
+    if (shadow_turn_kind == TURN_NONE)
+        return 0.0;
+    float phase = dot(pixel, vec2(0.06711056, 0.00583715));
+    if (shadow_turn_kind == TURN_OF_SURFACE) {
+        float pixel_mm = shadow_pixel_mm + shadow_pixel_eye_mm.w * distance(shadow_pixel_eye_mm.xyz, position_ws_mm);
+        vec3 cell = mod(floor(position_ws_mm / exp2(ceil(log2(pixel_mm))) + 0.37), 1024.0);
+        phase = dot(cell, vec3(0.06711056, 0.0198, 0.00583715));
+    }
+    return fract(52.9829189 * fract(phase));
 }
 
 // What blocks is as near as the nearest of all, at first; then no nearer than the nearest that is as near to the way.
-shade shadow_soft(shadow_plane plane, vec2 pixel)
+shade shadow_soft(shadow_plane plane, float turn_part)
 {
-    float least = 1.5 * plane.texel, radius = 0.0, nearest_mm = shadow_nearest_blocker_mm;
+    float least = 1.5 * plane.texel * plane.way.z, radius = 0.0, nearest_mm = shadow_nearest_blocker_mm;
     for (int i = 0; i < 3; i++) {
-        if (nearest_mm <= 0.0 || nearest_mm >= plane.depth_mm)
+        if (nearest_mm <= 0.0 || nearest_mm >= plane.away_mm)
             return shade(1.0);
-        radius = clamp(0.5 * shadow_width(plane.depth_mm, nearest_mm), least, 2.0 * shadow_half_width);
-        nearest_mm = shadow_nearest_mm(plane, radius + plane.texel);
+        float width = shadow_width(plane.away_mm, nearest_mm);
+        radius = clamp(0.5 * width, least, 2.0 * shadow_half_width);
+        nearest_mm = shadow_nearest_mm(plane, min(shadow_reach(plane, radius), 2.0 * shadow_half_width) + plane.texel);
     }
-    vec2 turn = shadow_turn(pixel);
+    float angle = 6.28318530718 * turn_part;
+    vec2 turn = vec2(cos(angle), sin(angle));
     shade mean_mm;
     if (nearest_mm <= 0.0 || !shadow_search(plane, radius, turn, mean_mm))
         return shade(1.0);
-    shade width = 0.5 * shadow_width(plane.depth_mm, mean_mm);
+    shade width = 0.5 * shadow_width(plane.away_mm, mean_mm);
     // what stays nowhere in one channel has no depth
     return shadow_filter(plane, clamp(width, shade(least), shade(radius)), turn);
 }
@@ -340,7 +386,7 @@ vec3 shadow_left(vec3 position_ws_mm, vec3 normal_ws, vec2 pixel)
     shadow_plane plane = shadow_plane_at(position_ws_mm, normal_ws);
 #ifdef HAS_SHADOW_TAPS
     if (shadow_light_size > 0.0)
-        return part * vec3(shadow_soft(plane, pixel));
+        return part * vec3(shadow_soft(plane, shadow_turn_part(pixel, position_ws_mm)));
 #endif
     return part * vec3(shadow_hard(plane));
 }

@@ -1,0 +1,242 @@
+#include "accuracy/calibrate.h"
+
+#include "io/file.h"
+#include "renderer/renderer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { REPEATS = 3, PICTURE_LIMIT = 64, EFFECT_SLOTS = RENDER_EFFECT_LIMIT + 1 };
+
+/* What is too short for its time to tell of more than the clock. */
+#define TOLD_MS 0.05
+
+/* ---- what is drawn ------------------------------------------------------------------------------ */
+
+static const struct {
+    const char *scene;
+    int frame;
+} scenes[] = { { "knot.json", 0 },
+               { "environment.json", 0 },
+               { "glass.json", 0 },
+               { "shadows.json", 0 },
+               { "twist.json", 10 } };
+enum { SCENE_COUNT = sizeof scenes / sizeof *scenes };
+
+static const int sizes_px[][2] = { { 160, 120 }, { 400, 300 } };
+enum { SIZE_COUNT = sizeof sizes_px / sizeof *sizes_px };
+
+static const struct render_options drawings[] = {
+    { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.1, .gather = RENDER_GATHER_C },
+    { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.01, .gather = RENDER_GATHER_C },
+    { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.05, .gather = RENDER_GATHER_GL },
+    { .technique = RENDER_TECHNIQUE_SPLAT, .epsilon = 0.1 },
+    { .technique = RENDER_TECHNIQUE_TSM, .epsilon = 0.15 },
+};
+enum { DRAWING_COUNT = sizeof drawings / sizeof *drawings };
+_Static_assert(SCENE_COUNT *SIZE_COUNT *DRAWING_COUNT <= PICTURE_LIMIT, "pictures");
+
+/* ---- what was measured -------------------------------------------------------------------------- */
+
+/* Of a picture: its effects, then what it takes beside them. Predicted without start; NAN: did not run. */
+struct picture {
+    double predicted_ms[EFFECT_SLOTS], measured_ms[EFFECT_SLOTS], first_ms[EFFECT_SLOTS];
+};
+
+struct measuring {
+    struct picture pictures[PICTURE_LIMIT];
+    size_t picture_count;
+    char names[EFFECT_SLOTS][32];
+    size_t effect_count; /* the last of names follows them */
+};
+
+static int compare(const void *a, const void *b)
+{
+    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
+}
+
+static double median(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, compare);
+    return count > 0 ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : NAN;
+}
+
+static void read_times(const struct render_report *report, double times_ms[EFFECT_SLOTS])
+{
+    double sum_ms = 0;
+    for (size_t e = 0; e < report->effect_count; e++) {
+        times_ms[e] = report->effects[e].time_ms;
+        sum_ms += times_ms[e];
+    }
+    times_ms[report->effect_count] = fmax(report->total_ms - sum_ms, 0);
+}
+
+static bool draw(struct renderer *renderer, const struct render_options *drawing,
+                 struct render_report *report, dipole_status *status)
+{
+    struct io_image *image;
+    const bool done = render_draw(renderer, drawing, &image, report, status);
+    io_image_destroy(image);
+    return done;
+}
+
+/* A picture of its own renderer, so that the first is one, and some more. */
+static bool measure(struct measuring *measuring, const struct io_scene *scene,
+                    const struct render_options *drawing, dipole_status *status)
+{
+    struct picture *const picture = &measuring->pictures[measuring->picture_count++];
+    struct renderer *renderer = NULL;
+    struct render_report report;
+    double times_ms[REPEATS][EFFECT_SLOTS];
+    bool done = render_create(scene, RENDER_CONTEXT_DEFAULT, &renderer, status);
+    if (done) {
+        renderer->is_calibrated = false;
+        done = draw(renderer, drawing, &report, status);
+    }
+    if (done)
+        read_times(&report, picture->first_ms);
+    for (int i = 0; i < REPEATS && done; i++) {
+        done = draw(renderer, drawing, &report, status);
+        if (done)
+            read_times(&report, times_ms[i]);
+    }
+    render_destroy(renderer);
+    if (!done)
+        return false;
+    measuring->effect_count = report.effect_count;
+    double sum_ms = 0;
+    for (size_t e = 0; e < report.effect_count; e++) {
+        snprintf(measuring->names[e], sizeof measuring->names[e], "%s", report.effects[e].name);
+        picture->predicted_ms[e] = report.effects[e].is_active ? report.effects[e].predicted_ms : NAN;
+        sum_ms += report.effects[e].predicted_ms;
+    }
+    picture->predicted_ms[report.effect_count] = report.predicted_ms - sum_ms;
+    snprintf(measuring->names[report.effect_count], sizeof *measuring->names, RENDER_BESIDE_EFFECTS);
+    for (size_t e = 0; e <= report.effect_count; e++) {
+        double values[REPEATS];
+        for (int i = 0; i < REPEATS; i++)
+            values[i] = times_ms[i][e];
+        picture->measured_ms[e] = median(values, REPEATS);
+    }
+    return true;
+}
+
+static bool measure_scene(struct measuring *measuring, int index, const struct render_progress *progress,
+                          dipole_status *status)
+{
+    char relative[64], path[4096];
+    snprintf(relative, sizeof relative, "scenes/%s", scenes[index].scene);
+    if (!io_data_path(relative, path, sizeof path, status))
+        return false;
+    bool done = true;
+    for (int s = 0; s < SIZE_COUNT && done; s++) {
+        struct io_scene *scene = NULL;
+        const struct io_scene_options reading = { .width_px = sizes_px[s][0], .height_px = sizes_px[s][1] };
+        done = io_scene_read(path, &reading, &scene, status);
+        if (done)
+            io_scene_set_frame(scene, scenes[index].frame);
+        for (int d = 0; d < DRAWING_COUNT && done; d++) {
+            const double step = (index * SIZE_COUNT + s) * DRAWING_COUNT + d;
+            if (progress->show)
+                progress->show(progress->context, scenes[index].scene,
+                               step / (SCENE_COUNT * SIZE_COUNT * DRAWING_COUNT));
+            /* shadow maps see no light from around: there would be nothing to draw */
+            const bool is_dark = scene->light_count == 0 && drawings[d].technique == RENDER_TECHNIQUE_TSM;
+            done = is_dark || measure(measuring, scene, &drawings[d], status);
+        }
+        io_scene_destroy(scene);
+    }
+    return done;
+}
+
+/* ---- what it says ------------------------------------------------------------------------------- */
+
+static void summarize(const struct measuring *measuring, size_t e, struct accuracy_effect_times *out)
+{
+    double ratios[PICTURE_LIMIT], starts_ms[PICTURE_LIMIT], errors[PICTURE_LIMIT];
+    size_t count = 0, ratio_count = 0;
+    snprintf(out->name, sizeof out->name, "%s", measuring->names[e]);
+    for (size_t i = 0; i < measuring->picture_count; i++) {
+        const struct picture *const picture = &measuring->pictures[i];
+        if (isnan(picture->predicted_ms[e]))
+            continue;
+        starts_ms[count++] = fmax(picture->first_ms[e] - picture->measured_ms[e], 0);
+        if (picture->predicted_ms[e] > 0 && picture->measured_ms[e] > TOLD_MS)
+            ratios[ratio_count++] = picture->measured_ms[e] / picture->predicted_ms[e];
+    }
+    out->count = count;
+    out->start_ms = median(starts_ms, count);
+    out->scale = ratio_count > 0 ? median(ratios, ratio_count) : 1;
+    for (size_t i = 0; i < ratio_count; i++)
+        errors[i] = fabs(out->scale / ratios[i] - 1);
+    out->median_error = median(errors, ratio_count);
+}
+
+static void summarize_pictures(const struct measuring *measuring, struct accuracy_calibration *calibration)
+{
+    double errors[PICTURE_LIMIT];
+    for (size_t i = 0; i < measuring->picture_count; i++) {
+        const struct picture *const picture = &measuring->pictures[i];
+        double predicted_ms = 0, measured_ms = 0;
+        for (size_t k = 0; k < calibration->effect_count; k++) {
+            for (size_t e = 0; e <= measuring->effect_count; e++) {
+                if (strcmp(measuring->names[e], calibration->effects[k].name) != 0 ||
+                    isnan(picture->predicted_ms[e]))
+                    continue;
+                predicted_ms += calibration->effects[k].scale * picture->predicted_ms[e];
+                measured_ms += picture->measured_ms[e];
+            }
+        }
+        errors[i] = fabs(predicted_ms / measured_ms - 1);
+    }
+    calibration->picture_count = measuring->picture_count;
+    calibration->median_error = median(errors, measuring->picture_count); /* sorts them */
+    calibration->largest_error = errors[measuring->picture_count - 1];
+}
+
+bool accuracy_calibrate(const struct render_progress *progress,
+                        struct accuracy_calibration *calibration_out, dipole_status *status)
+{
+    struct measuring *const measuring = calloc(1, sizeof *measuring);
+    struct io_scene *scene = NULL;
+    struct renderer *renderer = NULL;
+    char path[4096];
+    *calibration_out = (struct accuracy_calibration){ .effect_count = 0 };
+    if (!measuring)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a calibration");
+    bool done = io_data_path("scenes/knot.json", path, sizeof path, status) &&
+                io_scene_read(path, NULL, &scene, status) &&
+                render_create(scene, RENDER_CONTEXT_DEFAULT, &renderer, status);
+    if (done)
+        calibration_out->machine = renderer->machine;
+    render_destroy(renderer);
+    io_scene_destroy(scene);
+    for (int i = 0; i < SCENE_COUNT && done; i++)
+        done = measure_scene(measuring, i, progress, status);
+    for (size_t e = 0; e <= measuring->effect_count && done; e++) {
+        struct accuracy_effect_times *const effect =
+            &calibration_out->effects[calibration_out->effect_count];
+        summarize(measuring, e, effect);
+        calibration_out->effect_count += effect->count > 0;
+    }
+    if (done)
+        summarize_pictures(measuring, calibration_out);
+    free(measuring);
+    return done;
+}
+
+bool accuracy_calibration_keep(const struct accuracy_calibration *calibration, char *path_out, size_t size,
+                               dipole_status *status)
+{
+    struct render_calibration kept = { .effect_count = calibration->effect_count };
+    for (size_t i = 0; i < calibration->effect_count; i++) {
+        const struct accuracy_effect_times *const effect = &calibration->effects[i];
+        snprintf(kept.effects[i].name, sizeof kept.effects[i].name, "%s", effect->name);
+        kept.effects[i].scale = effect->scale;
+        kept.effects[i].start_ms = effect->start_ms;
+    }
+    return render_calibration_path(&calibration->machine, path_out, size, status) &&
+           render_calibration_write(path_out, &calibration->machine, &kept, status);
+}

@@ -1,0 +1,32 @@
+/* How long effects take on this machine, of what the plan would predict: measured on bundled scenes. */
+#ifndef ACCURACY_CALIBRATE_H
+#define ACCURACY_CALIBRATE_H
+
+#include "renderer/calibration.h"
+
+/* One effect, over all pictures that ran it. */
+struct accuracy_effect_times {
+    char name[32];
+    size_t count;        /* of pictures                                                 */
+    double scale;        /* median of measured over predicted                           */
+    double start_ms;     /* median of what the first picture took more                  */
+    double median_error; /* median of |predicted - measured| / measured, with that scale */
+};
+
+struct accuracy_calibration {
+    struct render_machine machine;
+    struct accuracy_effect_times effects[RENDER_EFFECT_LIMIT + 1]; /* with RENDER_BESIDE_EFFECTS */
+    size_t effect_count, picture_count;
+    double median_error, largest_error; /* the same of whole pictures */
+};
+
+/* Draw the bundled scenes by several techniques, sizes and epsilons, and compare: about half a minute.
+ * Fails as io_data_path, io_scene_read and render_create do. */
+DIPOLE_CHECKED bool accuracy_calibrate(const struct render_progress *progress,
+                                       struct accuracy_calibration *calibration_out, dipole_status *status);
+
+/* Keep it where renderers of this machine look for it, which path_out (of size bytes) is told. */
+DIPOLE_CHECKED bool accuracy_calibration_keep(const struct accuracy_calibration *calibration,
+                                              char *path_out, size_t size, dipole_status *status);
+
+#endif
