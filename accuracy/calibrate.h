@@ -20,7 +20,7 @@ struct accuracy_calibration {
     double median_error, largest_error; /* the same of whole pictures */
 };
 
-/* Draw the bundled scenes by several techniques, sizes and epsilons, and compare: about half a minute.
+/* Draw the bundled scenes by several techniques, sizes and epsilons, and compare: a minute or two.
  * Fails as io_data_path, io_scene_read and render_create do. */
 DIPOLE_CHECKED bool accuracy_calibrate(const struct render_progress *progress,
                                        struct accuracy_calibration *calibration_out, dipole_status *status);

@@ -208,7 +208,7 @@ int main(int argc, char **argv)
           .kind = CLI_FLAG,
           .target = &options.is_calibrating,
           .help = "Measure how long effects take on this machine, and keep it for predictions of all "
-                  "programs: about half a minute, without other work beside it." },
+                  "programs: a minute or two, without other work beside it." },
         { .name = "monte-carlo",
           .kind = CLI_FLAG,
           .target = &options.is_simulating,
