@@ -40,7 +40,7 @@ struct accuracy_sweep {
     struct accuracy_subject *subject;
     struct io_image *reference;
     double reference_error; /* estimated */
-    char key[64];           /* of scene, size and version: what was measured of another is not taken over */
+    char key[64];           /* of scene, size and program: what was measured of another is not taken over */
     int repeat_count;
     struct accuracy_point *points;
     size_t point_count;
