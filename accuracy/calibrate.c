@@ -1,5 +1,6 @@
 #include "accuracy/calibrate.h"
 
+#include "accuracy/statistics.h"
 #include "io/file.h"
 #include "renderer/renderer.h"
 
@@ -51,17 +52,6 @@ struct measuring {
     char names[EFFECT_SLOTS][32];
     size_t effect_count; /* the last of names follows them */
 };
-
-static int compare(const void *a, const void *b)
-{
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
-}
-
-static double median(double *values, size_t count)
-{
-    qsort(values, count, sizeof *values, compare);
-    return count > 0 ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : NAN;
-}
 
 static void read_times(const struct render_report *report, double times_ms[EFFECT_SLOTS])
 {
@@ -118,7 +108,7 @@ static bool measure(struct measuring *measuring, const struct io_scene *scene,
         double values[REPEATS];
         for (int i = 0; i < REPEATS; i++)
             values[i] = times_ms[i][e];
-        picture->measured_ms[e] = median(values, REPEATS);
+        picture->measured_ms[e] = accuracy_median(values, REPEATS);
     }
     return true;
 }
@@ -167,11 +157,11 @@ static void summarize(const struct measuring *measuring, size_t e, struct accura
             ratios[ratio_count++] = picture->measured_ms[e] / picture->predicted_ms[e];
     }
     out->count = count;
-    out->start_ms = median(starts_ms, count);
-    out->scale = ratio_count > 0 ? median(ratios, ratio_count) : 1;
+    out->start_ms = accuracy_median(starts_ms, count);
+    out->scale = ratio_count > 0 ? accuracy_median(ratios, ratio_count) : 1;
     for (size_t i = 0; i < ratio_count; i++)
         errors[i] = fabs(out->scale / ratios[i] - 1);
-    out->median_error = median(errors, ratio_count);
+    out->median_error = accuracy_median(errors, ratio_count);
 }
 
 static void summarize_pictures(const struct measuring *measuring, struct accuracy_calibration *calibration)
@@ -192,7 +182,7 @@ static void summarize_pictures(const struct measuring *measuring, struct accurac
         errors[i] = fabs(predicted_ms / measured_ms - 1);
     }
     calibration->picture_count = measuring->picture_count;
-    calibration->median_error = median(errors, measuring->picture_count); /* sorts them */
+    calibration->median_error = accuracy_median(errors, measuring->picture_count); /* sorts them */
     calibration->largest_error = errors[measuring->picture_count - 1];
 }
 

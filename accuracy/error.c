@@ -1,6 +1,7 @@
 #include "accuracy/error.h"
 
 #include "accuracy/interior.h"
+#include "accuracy/statistics.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,11 +22,6 @@ static double brightest_of(const struct io_image *image)
             brightest = fmax(brightest, (double)image->pixels[4 * i + c]);
     }
     return brightest;
-}
-
-static int compare(const void *a, const void *b)
-{
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
 }
 
 static bool check_sizes(const struct io_image *reference, const struct io_image *picture,
@@ -68,7 +64,7 @@ bool accuracy_error_measure(const struct io_image *reference, const struct io_im
                 relative[count++] = fabs(error) / expected;
         }
     }
-    qsort(relative, count, sizeof *relative, compare);
+    qsort(relative, count, sizeof *relative, accuracy_compare_numbers);
     if (count > 0) {
         error_out->rmse = sqrt(error2[1] / value2[1]);
         error_out->rmse_all = sqrt((error2[0] + error2[1]) / (value2[0] + value2[1]));

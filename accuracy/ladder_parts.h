@@ -3,6 +3,7 @@
 #define ACCURACY_LADDER_PARTS_H
 
 #include "accuracy/ladder.h"
+#include "accuracy/statistics.h"
 
 #define LADDER_PI 3.14159265358979323846
 
@@ -21,9 +22,6 @@ extern const struct ladder_kind ladder_kinds[ACCURACY_RUNG_COUNT];
 
 /* Median of a few times, each of so many calls that the clock can tell; a slow call is made once. */
 double ladder_measure_ns(void (*call)(void *context), void *context);
-
-/* Sorts them. */
-double ladder_median(double *values, size_t count);
 
 /* ---- what is timed -------------------------------------------------------------------------------- */
 

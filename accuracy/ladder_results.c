@@ -26,8 +26,8 @@ bool accuracy_rung_summarize(const struct accuracy_ladder *ladder, size_t rung,
         out->error_high = fmax(out->error_high, at->error);
     }
     if (out->count > 0) {
-        out->error = ladder_median(values, out->count);
-        out->time_ns = ladder_median(values + ladder->case_count, out->count);
+        out->error = accuracy_median(values, out->count);
+        out->time_ns = accuracy_median(values + ladder->case_count, out->count);
     }
     free(values);
     return out->count > 0;

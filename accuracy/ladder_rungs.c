@@ -29,18 +29,6 @@ static double now_s(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static int compare_numbers(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-double ladder_median(double *values, size_t count)
-{
-    qsort(values, count, sizeof *values, compare_numbers);
-    return values[count / 2];
-}
-
 double ladder_measure_ns(void (*call)(void *context), void *context)
 {
     double times_ns[REPEAT_COUNT];
@@ -56,7 +44,7 @@ double ladder_measure_ns(void (*call)(void *context), void *context)
             call(context);
         times_ns[i] = 1e9 * (now_s() - start_s) / calls;
     }
-    return ladder_median(times_ns, REPEAT_COUNT);
+    return accuracy_median(times_ns, REPEAT_COUNT);
 }
 
 /* ---- what is timed -------------------------------------------------------------------------------- */

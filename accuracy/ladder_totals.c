@@ -93,7 +93,7 @@ bool ladder_climb_totals(const struct accuracy_ladder_options *options, size_t r
         ladder->totals[is_forward][rung] =
             (struct accuracy_rung){ .is_known = true,
                                     .error = sqrt(sums.error2 / (double)sums.count),
-                                    .time_ns = ladder_median(times_ns, sums.time_count) };
+                                    .time_ns = accuracy_median(times_ns, sums.time_count) };
         ladder->total_counts[is_forward][rung] = sums.count;
     }
     return done;

@@ -1,5 +1,6 @@
 #include "accuracy/page_internal.h"
 
+#include "accuracy/statistics.h"
 #include "renderer/plan.h"
 
 #include <math.h>
@@ -7,17 +8,6 @@
 
 /* What a prediction is to be: an upper bound, and within this factor. */
 #define FACTOR 3.0
-
-static int compare(const void *a, const void *b)
-{
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
-}
-
-static double median(double *values, size_t count)
-{
-    qsort(values, count, sizeof *values, compare);
-    return count > 0 ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : (double)NAN;
-}
 
 /* ---- errors ------------------------------------------------------------------------------------- */
 
@@ -59,7 +49,7 @@ static void add_error_row(struct plot_text *page, const char *title, struct tall
                     (int)tally->count, (int)tally->bounded);
     plot_text_print(page, "<td class=\"number\">%d</td>", (int)tally->within);
     const char *const reason = explain(tally);
-    accuracy_page_add_cell(page, median(tally->ratios, tally->count), 2);
+    accuracy_page_add_cell(page, accuracy_median(tally->ratios, tally->count), 2);
     plot_text_print(page, "<td class=\"note\">%s</td></tr>\n", reason);
 }
 
@@ -93,7 +83,7 @@ static void add_errors(struct plot_text *page, const struct accuracy_sweep *swee
 static void add_time_row(struct plot_text *page, const char *name, double *errors, size_t count)
 {
     plot_text_print(page, "<tr><td>%s</td><td class=\"number\">%d</td>", name, (int)count);
-    accuracy_page_add_cell(page, 100 * median(errors, count), 2);
+    accuracy_page_add_cell(page, 100 * accuracy_median(errors, count), 2);
     fit_page_add(page, "</tr>\n");
 }
 
@@ -111,7 +101,7 @@ static bool add_times(struct plot_text *page, const struct accuracy_sweep *sweep
     }
     plot_text_print(page,
                     "<p>Times of pictures are predicted to within %f %% in half of %d points, %s.</p>\n",
-                    100 * median(errors, count), (int)count,
+                    100 * accuracy_median(errors, count), (int)count,
                     sweep->subject->renderer->is_calibrated
                         ? "by a calibration of this machine"
                         : "as on another machine: accuracy --calibrate measures this one");

@@ -1,5 +1,6 @@
 #include "accuracy/sweep.h"
 
+#include "accuracy/statistics.h"
 #include "io/hash.h"
 #include "renderer/reference.h"
 #include "renderer/renderer.h"
@@ -97,11 +98,6 @@ void accuracy_sweep_end(struct accuracy_sweep *sweep)
 
 /* ---- drawing ------------------------------------------------------------------------------------ */
 
-static int compare(const void *a, const void *b)
-{
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
-}
-
 static void summarize(struct accuracy_point *point)
 {
     double sorted[ACCURACY_REPEAT_LIMIT];
@@ -109,7 +105,7 @@ static void summarize(struct accuracy_point *point)
     if (count == 0)
         return;
     memcpy(sorted, point->times_ms, count * sizeof *sorted);
-    qsort(sorted, count, sizeof *sorted, compare);
+    qsort(sorted, count, sizeof *sorted, accuracy_compare_numbers);
     point->median_ms = 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
     point->low_ms = sorted[count / 4];
     point->high_ms = sorted[count - 1 - count / 4];

@@ -1,6 +1,7 @@
 #include "renderer/casters.h"
 
 #include "renderer/passage.h"
+#include "renderer/projection.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -9,25 +10,14 @@
 
 #define PI 3.14159265358979323846
 
-/* Distance of two boxes. */
-static double gap_mm(const struct io_mesh *a, const struct io_mesh *b)
-{
-    double gap2 = 0;
-    for (int k = 0; k < 3; k++) {
-        const double gap =
-            fmax(fmax((double)a->min[k] - (double)b->max[k], (double)b->min[k] - (double)a->max[k]), 0);
-        gap2 += gap * gap;
-    }
-    return sqrt(gap2);
-}
-
 static double nearest_gap_mm(const struct io_scene *scene, size_t object)
 {
     double nearest_mm = INFINITY;
     for (size_t i = 0; i < scene->object_count; i++)
-        nearest_mm = i == object
-                         ? nearest_mm
-                         : fmin(nearest_mm, gap_mm(scene->objects[object].mesh, scene->objects[i].mesh));
+        nearest_mm =
+            i == object
+                ? nearest_mm
+                : fmin(nearest_mm, render_mesh_gap_mm(scene->objects[object].mesh, scene->objects[i].mesh));
     return nearest_mm;
 }
 

@@ -239,18 +239,6 @@ static bool read_scene(const struct render_request *request, struct render_plan 
     return true;
 }
 
-/* Distance of two boxes. */
-static double gap_mm(const struct io_mesh *a, const struct io_mesh *b)
-{
-    double gap2 = 0;
-    for (int k = 0; k < 3; k++) {
-        const double gap =
-            fmax(fmax((double)a->min[k] - (double)b->max[k], (double)b->min[k] - (double)a->max[k]), 0);
-        gap2 += gap * gap;
-    }
-    return sqrt(gap2);
-}
-
 /* Whether light of one object could be taken for another's, or be spread by another's profile. */
 static void tell_objects_apart(const struct render_request *request, struct render_plan *plan)
 {
@@ -269,7 +257,8 @@ static void tell_objects_apart(const struct render_request *request, struct rend
     }
     for (size_t i = 0; i < scene->object_count && !plan->has_object_ids; i++) {
         for (size_t j = 0; j < i && !plan->has_object_ids; j++)
-            plan->has_object_ids = gap_mm(scene->objects[i].mesh, scene->objects[j].mesh) <= plan->r_max_mm;
+            plan->has_object_ids =
+                render_mesh_gap_mm(scene->objects[i].mesh, scene->objects[j].mesh) <= plan->r_max_mm;
     }
     if (plan->has_object_ids)
         plan->ids_reason = "objects within r_max of each other";

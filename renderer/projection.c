@@ -68,6 +68,17 @@ struct render_ball render_ball_of_mesh(const struct io_mesh *mesh)
     return ball;
 }
 
+double render_mesh_gap_mm(const struct io_mesh *a, const struct io_mesh *b)
+{
+    double gap2 = 0;
+    for (int k = 0; k < 3; k++) {
+        const double gap =
+            fmax(fmax((double)a->min[k] - (double)b->max[k], (double)b->min[k] - (double)a->max[k]), 0);
+        gap2 += gap * gap;
+    }
+    return sqrt(gap2);
+}
+
 void render_projection_aim(struct render_projection *projection, const double forward[3],
                            const double up[3])
 {

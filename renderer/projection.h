@@ -22,6 +22,9 @@ struct render_ball {
 struct render_ball render_ball_of_scene(const struct io_scene *scene);
 struct render_ball render_ball_of_mesh(const struct io_mesh *mesh);
 
+/* Distance of the boxes about two meshes; 0 where they meet. */
+double render_mesh_gap_mm(const struct io_mesh *a, const struct io_mesh *b);
+
 /* Turn the view along forward (a unit vector), with up as close as may be to the vector given. */
 void render_projection_aim(struct render_projection *projection, const double forward[3],
                            const double up[3]);
