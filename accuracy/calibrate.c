@@ -38,11 +38,13 @@ static const struct render_options drawings[] = {
 };
 enum { DRAWING_COUNT = sizeof drawings / sizeof *drawings };
 _Static_assert(SCENE_COUNT *SIZE_COUNT *DRAWING_COUNT <= PICTURE_LIMIT, "pictures");
+_Static_assert((int)PICTURE_LIMIT <= (int)ACCURACY_LINE_POINTS, "points");
 
 /* ---- what was measured -------------------------------------------------------------------------- */
 
 /* Of a picture: its effects, then what it takes beside them. Predicted without start; NAN: did not run. */
 struct picture {
+    int scene;
     double predicted_ms[EFFECT_SLOTS], measured_ms[EFFECT_SLOTS], first_ms[EFFECT_SLOTS];
 };
 
@@ -73,10 +75,11 @@ static bool draw(struct renderer *renderer, const struct render_options *drawing
 }
 
 /* A picture of its own renderer, so that the first is one, and some more. */
-static bool measure(struct measuring *measuring, const struct io_scene *scene,
+static bool measure(struct measuring *measuring, int index, const struct io_scene *scene,
                     const struct render_options *drawing, dipole_status *status)
 {
     struct picture *const picture = &measuring->pictures[measuring->picture_count++];
+    picture->scene = index;
     struct renderer *renderer = NULL;
     struct render_report report;
     double times_ms[REPEATS][EFFECT_SLOTS];
@@ -134,7 +137,7 @@ static bool measure_scene(struct measuring *measuring, int index, const struct r
                                step / (SCENE_COUNT * SIZE_COUNT * DRAWING_COUNT));
             /* shadow maps see no light from around: there would be nothing to draw */
             const bool is_dark = scene->light_count == 0 && drawings[d].technique == RENDER_TECHNIQUE_TSM;
-            done = is_dark || measure(measuring, scene, &drawings[d], status);
+            done = is_dark || measure(measuring, index, scene, &drawings[d], status);
         }
         io_scene_destroy(scene);
     }
@@ -143,44 +146,80 @@ static bool measure_scene(struct measuring *measuring, int index, const struct r
 
 /* ---- what it says ------------------------------------------------------------------------------- */
 
+enum { NO_SCENE = -1 };
+
+static bool is_told(const struct picture *picture, size_t e)
+{
+    return picture->predicted_ms[e] > 0 && picture->measured_ms[e] > TOLD_MS;
+}
+
+/* Of all scenes but one, if others have it. */
+static struct accuracy_line fit_times(const struct measuring *measuring, size_t e, int left_out)
+{
+    double predicted_ms[PICTURE_LIMIT], measured_ms[PICTURE_LIMIT];
+    size_t count = 0;
+    for (size_t i = 0; i < measuring->picture_count; i++) {
+        const struct picture *const picture = &measuring->pictures[i];
+        if (picture->scene == left_out || !is_told(picture, e))
+            continue;
+        predicted_ms[count] = picture->predicted_ms[e];
+        measured_ms[count++] = picture->measured_ms[e];
+    }
+    if (count == 0 && left_out != NO_SCENE)
+        return fit_times(measuring, e, NO_SCENE);
+    return accuracy_fit_line(predicted_ms, measured_ms, count);
+}
+
+static double predict_ms(struct accuracy_line line, double predicted_ms)
+{
+    return line.intercept + line.slope * predicted_ms;
+}
+
 static void summarize(const struct measuring *measuring, size_t e, struct accuracy_effect_times *out)
 {
-    double ratios[PICTURE_LIMIT], starts_ms[PICTURE_LIMIT], errors[PICTURE_LIMIT];
-    size_t count = 0, ratio_count = 0;
+    const struct accuracy_line line = fit_times(measuring, e, NO_SCENE);
+    double starts_ms[PICTURE_LIMIT], errors[PICTURE_LIMIT];
+    size_t count = 0, told_count = 0;
     snprintf(out->name, sizeof out->name, "%s", measuring->names[e]);
     for (size_t i = 0; i < measuring->picture_count; i++) {
         const struct picture *const picture = &measuring->pictures[i];
         if (isnan(picture->predicted_ms[e]))
             continue;
         starts_ms[count++] = fmax(picture->first_ms[e] - picture->measured_ms[e], 0);
-        if (picture->predicted_ms[e] > 0 && picture->measured_ms[e] > TOLD_MS)
-            ratios[ratio_count++] = picture->measured_ms[e] / picture->predicted_ms[e];
+        if (is_told(picture, e))
+            errors[told_count++] =
+                fabs(predict_ms(line, picture->predicted_ms[e]) / picture->measured_ms[e] - 1);
     }
     out->count = count;
+    out->fixed_ms = line.intercept;
+    out->scale = line.slope;
     out->start_ms = accuracy_median(starts_ms, count);
-    out->scale = ratio_count > 0 ? accuracy_median(ratios, ratio_count) : 1;
-    for (size_t i = 0; i < ratio_count; i++)
-        errors[i] = fabs(out->scale / ratios[i] - 1);
-    out->median_error = accuracy_median(errors, ratio_count);
+    out->median_error = accuracy_median(errors, told_count);
+}
+
+/* Errors of whole pictures, by calibrations that have seen their scenes or have not. */
+static void measure_errors(const struct measuring *measuring, bool is_seen, double errors[PICTURE_LIMIT])
+{
+    for (size_t i = 0; i < measuring->picture_count; i++) {
+        const struct picture *const picture = &measuring->pictures[i];
+        double predicted_ms = 0, measured_ms = 0;
+        for (size_t e = 0; e <= measuring->effect_count; e++) {
+            if (isnan(picture->predicted_ms[e]))
+                continue;
+            const struct accuracy_line line = fit_times(measuring, e, is_seen ? NO_SCENE : picture->scene);
+            predicted_ms += predict_ms(line, picture->predicted_ms[e]);
+            measured_ms += picture->measured_ms[e];
+        }
+        errors[i] = fabs(predicted_ms / measured_ms - 1);
+    }
 }
 
 static void summarize_pictures(const struct measuring *measuring, struct accuracy_calibration *calibration)
 {
     double errors[PICTURE_LIMIT];
-    for (size_t i = 0; i < measuring->picture_count; i++) {
-        const struct picture *const picture = &measuring->pictures[i];
-        double predicted_ms = 0, measured_ms = 0;
-        for (size_t k = 0; k < calibration->effect_count; k++) {
-            for (size_t e = 0; e <= measuring->effect_count; e++) {
-                if (strcmp(measuring->names[e], calibration->effects[k].name) != 0 ||
-                    isnan(picture->predicted_ms[e]))
-                    continue;
-                predicted_ms += calibration->effects[k].scale * picture->predicted_ms[e];
-                measured_ms += picture->measured_ms[e];
-            }
-        }
-        errors[i] = fabs(predicted_ms / measured_ms - 1);
-    }
+    measure_errors(measuring, false, errors);
+    calibration->unseen_error = accuracy_median(errors, measuring->picture_count);
+    measure_errors(measuring, true, errors);
     calibration->picture_count = measuring->picture_count;
     calibration->median_error = accuracy_median(errors, measuring->picture_count); /* sorts them */
     calibration->largest_error = errors[measuring->picture_count - 1];
@@ -224,6 +263,7 @@ bool accuracy_calibration_keep(const struct accuracy_calibration *calibration, c
     for (size_t i = 0; i < calibration->effect_count; i++) {
         const struct accuracy_effect_times *const effect = &calibration->effects[i];
         snprintf(kept.effects[i].name, sizeof kept.effects[i].name, "%s", effect->name);
+        kept.effects[i].fixed_ms = effect->fixed_ms;
         kept.effects[i].scale = effect->scale;
         kept.effects[i].start_ms = effect->start_ms;
     }

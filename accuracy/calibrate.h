@@ -8,9 +8,10 @@
 struct accuracy_effect_times {
     char name[32];
     size_t count;        /* of pictures                                                 */
-    double scale;        /* median of measured over predicted                           */
-    double start_ms;     /* median of what the first picture took more                  */
-    double median_error; /* median of |predicted - measured| / measured, with that scale */
+    double fixed_ms;     /* what it takes whatever there is to do                         */
+    double scale;        /* times what is predicted without calibration                   */
+    double start_ms;     /* median of what the first picture took more                    */
+    double median_error; /* median of |predicted - measured| / measured; NAN: too short to tell */
 };
 
 struct accuracy_calibration {
@@ -18,6 +19,7 @@ struct accuracy_calibration {
     struct accuracy_effect_times effects[RENDER_EFFECT_LIMIT + 1]; /* with RENDER_BESIDE_EFFECTS */
     size_t effect_count, picture_count;
     double median_error, largest_error; /* the same of whole pictures */
+    double unseen_error; /* median of whole pictures, calibrated by the pictures of all other scenes */
 };
 
 /* Draw the bundled scenes by several techniques, sizes and epsilons, and compare: a minute or two.

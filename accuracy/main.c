@@ -107,8 +107,8 @@ static bool print_json(json_t *result, dipole_status *status)
 
 static void print_effect(const struct accuracy_effect_times *effect)
 {
-    printf("%-22s %4zu pictures  x %-6.3g + %5.1f ms at first", effect->name, effect->count, effect->scale,
-           effect->start_ms);
+    printf("%-22s %4zu pictures  x %-6.3g + %4.1f ms, %5.1f at first", effect->name, effect->count,
+           effect->scale, effect->fixed_ms, effect->start_ms);
     if (isnan(effect->median_error))
         printf("  too short to tell\n");
     else
@@ -125,20 +125,23 @@ static bool print_calibration(const struct accuracy_calibration *calibration, co
             print_effect(effect);
         json_array_append_new(
             effects,
-            json_pack("{s:s, s:I, s:f, s:f, s:o}", "name", effect->name, "pictures",
-                      (json_int_t)effect->count, "scale", effect->scale, "start_ms", effect->start_ms,
-                      "median_error",
+            json_pack("{s:s, s:I, s:f, s:f, s:f, s:o}", "name", effect->name, "pictures",
+                      (json_int_t)effect->count, "fixed_ms", effect->fixed_ms, "scale", effect->scale,
+                      "start_ms", effect->start_ms, "median_error",
                       isnan(effect->median_error) ? json_null() : json_real(effect->median_error)));
     }
     json_t *const result =
-        json_pack("{s:s, s:o, s:I, s:f, s:f}", "calibration", path, "effects", effects, "pictures",
+        json_pack("{s:s, s:o, s:I, s:f, s:f, s:f}", "calibration", path, "effects", effects, "pictures",
                   (json_int_t)calibration->picture_count, "median_error", calibration->median_error,
-                  "largest_error", calibration->largest_error);
+                  "largest_error", calibration->largest_error, "unseen_error", calibration->unseen_error);
     if (is_json)
         return print_json(result, status);
     json_decref(result);
-    printf("%s: %zu pictures are predicted to within %.0f %% in half of them, %.0f %% at most\n", path,
-           calibration->picture_count, 100 * calibration->median_error, 100 * calibration->largest_error);
+    printf(
+        "%s: %zu pictures are predicted to within %.0f %% in half of them, %.0f %% at most; to within %.0f "
+        "%% in half of them by what pictures of other scenes tell\n",
+        path, calibration->picture_count, 100 * calibration->median_error, 100 * calibration->largest_error,
+        100 * calibration->unseen_error);
     return true;
 }
 

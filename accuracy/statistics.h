@@ -10,4 +10,15 @@ int accuracy_compare_numbers(const void *a, const void *b);
 /* Sorts them. The mean of the two in the middle of an even count; NAN of none. */
 double accuracy_median(double *values, size_t count);
 
+struct accuracy_line {
+    double intercept, slope;
+};
+
+enum { ACCURACY_LINE_POINTS = 64 };
+
+/* y = intercept + slope x, both at least 0, of up to ACCURACY_LINE_POINTS points with x and y > 0: the line
+ * with the least sum of |line - y|/y, so that points far off hardly move it. Of intercepts the parts 0,
+ * 1/32, 2/32 ... of the least y are tried. */
+struct accuracy_line accuracy_fit_line(const double *x, const double *y, size_t count);
+
 #endif

@@ -87,14 +87,15 @@ bool render_calibration_path(const struct render_machine *machine, char *out, si
 }
 
 static const char *const root_keys[] = { "version", "cpu", "cores", "opengl", "effects", NULL };
-static const char *const effect_keys[] = { "name", "scale", "start_ms", NULL };
-enum { ROOT_KEYS = 5, EFFECT_KEYS = 3 };
+static const char *const effect_keys[] = { "name", "fixed_ms", "scale", "start_ms", NULL };
+enum { ROOT_KEYS = 5, EFFECT_KEYS = 4 };
 
 static bool read_effect(const struct io_json *at, struct render_effect_calibration *effect,
                         dipole_status *status)
 {
     return io_json_check_object(at, effect_keys, EFFECT_KEYS, status) &&
            io_json_get_text(at, "name", effect->name, sizeof effect->name, status) &&
+           io_json_get_number(at, "fixed_ms", 0, TIME_MAX_MS, &effect->fixed_ms, status) &&
            io_json_get_number(at, "scale", SCALE_MIN, SCALE_MAX, &effect->scale, status) &&
            io_json_get_number(at, "start_ms", 0, TIME_MAX_MS, &effect->start_ms, status);
 }
@@ -141,8 +142,9 @@ static char *format(const struct render_machine *machine, const struct render_ca
     json_t *const effects = json_array();
     for (size_t i = 0; i < calibration->effect_count; i++) {
         const struct render_effect_calibration *const effect = &calibration->effects[i];
-        json_array_append_new(effects, json_pack("{s:s, s:f, s:f}", "name", effect->name, "scale",
-                                                 effect->scale, "start_ms", effect->start_ms));
+        json_array_append_new(effects, json_pack("{s:s, s:f, s:f, s:f}", "name", effect->name, "fixed_ms",
+                                                 effect->fixed_ms, "scale", effect->scale, "start_ms",
+                                                 effect->start_ms));
     }
     json_t *const root =
         json_pack("{s:s, s:s, s:i, s:s, s:o}", "version", dipole_version(), "cpu", machine->cpu, "cores",

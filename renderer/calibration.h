@@ -20,8 +20,9 @@ void render_machine_identify(const char *driver, struct render_machine *machine)
 
 struct render_effect_calibration {
     char name[32];
-    double scale;    /* measured over predicted, of pictures after the first: median */
-    double start_ms; /* by which the first picture takes longer                      */
+    double fixed_ms; /* what it takes whatever there is to do                            */
+    double scale;    /* times what is predicted: the rest, of pictures after the first   */
+    double start_ms; /* by which the first picture takes longer                          */
 };
 
 struct render_calibration {

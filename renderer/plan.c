@@ -308,7 +308,8 @@ static double predict_ms(const struct render_request *request, const struct rend
         render_calibration_find(request->calibration, effect->name);
     const double start_ms =
         here ? here->start_ms : effect->start_ms + RENDER_COST_PROGRAM_MS * (double)program_count(effect);
-    return (here ? here->scale : 1) * cost_ms + (request->is_warm ? 0 : start_ms);
+    const double here_ms = here ? here->fixed_ms + here->scale * cost_ms : cost_ms;
+    return here_ms + (request->is_warm ? 0 : start_ms);
 }
 
 /* The same of what no effect does. */
@@ -317,9 +318,8 @@ static double predict_beside_ms(const struct render_request *request, const stru
     const struct render_effect_calibration *const here =
         render_calibration_find(request->calibration, RENDER_BESIDE_EFFECTS);
     const double cost_ms = render_cost_ms(RENDER_COST_BESIDE_PIXEL, render_cost_pixels(plan));
-    return (here ? here->scale : 1) * cost_ms + (request->is_warm ? 0
-                                                 : here           ? here->start_ms
-                                                                  : RENDER_COST_BESIDE_MS);
+    const double here_ms = here ? here->fixed_ms + here->scale * cost_ms : cost_ms;
+    return here_ms + (request->is_warm ? 0 : here ? here->start_ms : RENDER_COST_BESIDE_MS);
 }
 
 const char *const render_gather_names[] = { "auto", "c", "gl", NULL };

@@ -16,10 +16,10 @@ static struct render_machine machine(void)
 
 static struct render_calibration calibration(void)
 {
-    return (struct render_calibration){
-        .effects = { { "surface", 0.5, 7 }, { "gather", 2, 0 }, { RENDER_BESIDE_EFFECTS, 1, 11 } },
-        .effect_count = 3
-    };
+    return (struct render_calibration){ .effects = { { "surface", 0.25, 0.5, 7 },
+                                                     { "gather", 0, 2, 0 },
+                                                     { RENDER_BESIDE_EFFECTS, 0, 1, 11 } },
+                                        .effect_count = 3 };
 }
 
 /* Oracle: what was written. */
@@ -34,6 +34,7 @@ static void what_is_kept_is_read_back(void **state)
     assert_int_equal(read.effect_count, kept.effect_count);
     for (size_t i = 0; i < kept.effect_count; i++) {
         assert_string_equal(read.effects[i].name, kept.effects[i].name);
+        assert_close(read.effects[i].fixed_ms, kept.effects[i].fixed_ms, 0, "fixed");
         assert_close(read.effects[i].scale, kept.effects[i].scale, 0, "scale");
         assert_close(read.effects[i].start_ms, kept.effects[i].start_ms, 0, "start");
     }
@@ -111,7 +112,7 @@ static void damaged_files_are_refused(void **state)
     }
 }
 
-/* Oracle: scale times the cost, and start once, of the first picture alone. */
+/* Oracle: scale times the cost beside what is fixed, and start once, of the first picture alone. */
 static void plans_predict_as_calibrated(void **state)
 {
     (void)state;
@@ -131,8 +132,8 @@ static void plans_predict_as_calibrated(void **state)
     struct render_plan *const first = plan_for(&request);
     const double surface_ms = decision_of(bare, "surface")->cost_ms;
     assert_true(surface_ms > 0);
-    assert_close(decision_of(warm, "surface")->cost_ms, 0.5 * surface_ms, 1e-12, "scaled");
-    assert_close(decision_of(first, "surface")->cost_ms, 0.5 * surface_ms + 7, 1e-12, "with start");
+    assert_close(decision_of(warm, "surface")->cost_ms, 0.25 + 0.5 * surface_ms, 1e-12, "scaled");
+    assert_close(decision_of(first, "surface")->cost_ms, 0.25 + 0.5 * surface_ms + 7, 1e-12, "with start");
     assert_close(decision_of(warm, "gather")->cost_ms, 2 * decision_of(bare, "gather")->cost_ms, 1e-12,
                  "gather");
     assert_close(decision_of(warm, "light_view")->cost_ms, decision_of(bare, "light_view")->cost_ms, 0,
