@@ -159,7 +159,7 @@ static bool sum_gathered(const struct bench *bench, const struct render_plan *pl
         render_gather_sources_init(samples->samples,
                                    plan->coherence == RENDER_COHERENCE_SURFACE ? samples->codes : NULL,
                                    render_plan_code_level(plan, 0), samples->count, planned->bands,
-                                   planned->band_count, &sources, status) &&
+                                   planned->band_count, planned->spread_mm, &sources, status) &&
         render_gather_run(&request, rgb[0], NULL, status);
     render_gather_sources_end(&sources);
     for (int i = 0; done && i < POINTS; i++)

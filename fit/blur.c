@@ -46,6 +46,7 @@ static size_t interpolation(const double *node_r_mm, size_t node_count, double r
 /* Rings of equal steps in s where s is large, and in log s next to 0. */
 static void fill_row(struct fit_blur *blur, double blur_mm, double r_mm, double *row)
 {
+    const struct render_footprint_kernel kernel = { .blur_mm = blur_mm };
     const double last_mm = r_mm + kernel_reach * blur_mm;
     double s_mm = fmax(r_mm - kernel_reach * blur_mm, blur->node_r_mm[0]);
     while (s_mm < last_mm) {
@@ -54,7 +55,7 @@ static void fill_row(struct fit_blur *blur, double blur_mm, double r_mm, double 
         for (int point = 0; point < 2; point++) {
             const double at_mm = s_mm + width_mm * (point == 0 ? 0.21132486540518712 : 0.78867513459481288);
             const double power =
-                2 * PI * at_mm * 0.5 * width_mm * render_footprint_kernel_per_mm2(blur_mm, r_mm, at_mm);
+                2 * PI * at_mm * 0.5 * width_mm * render_footprint_kernel_per_mm2(&kernel, r_mm, at_mm);
             double weights[STENCIL];
             const size_t first = interpolation(blur->node_r_mm, blur->node_count, at_mm, weights);
             for (size_t k = 0; k < STENCIL; k++)

@@ -31,7 +31,8 @@ static bool is_same_band(const struct render_band *a, const struct render_band *
 bool render_band_keys_are_same(const struct render_band_key *a, const struct render_band_key *b)
 {
     bool is_same = a->source.table == b->source.table && a->source.row == b->source.row &&
-                   a->source.medium == b->source.medium && a->band_count == b->band_count;
+                   a->source.medium == b->source.medium && a->source.spread_mm == b->source.spread_mm &&
+                   a->band_count == b->band_count;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
         is_same = is_same && a->source.blur_mm[c] == b->source.blur_mm[c];
     for (int i = 0; is_same && i < a->band_count; i++)
@@ -41,27 +42,43 @@ bool render_band_keys_are_same(const struct render_band_key *a, const struct ren
 
 /* ---- split -------------------------------------------------------------------------------------- */
 
-static void whole_profile(const struct render_split *split, double r_mm, double rgb[IO_CHANNEL_COUNT])
+static void from_table(const struct render_band_source *source, double r_mm, double rgb[IO_CHANNEL_COUNT])
 {
-    const struct render_band_source *const source = &split->source;
     /* The last node may round to beyond the axis, where the table is 0. Footprints may be wider than it. */
     const double r_max_mm = source->table->rows[source->row].axis.r_max_mm;
-    const bool is_beyond = r_mm > r_max_mm * (1 + 1e-9);
     lut_splat_sample(source->table, source->row, fmin(r_mm, r_max_mm), rgb);
+    for (int c = 0; c < IO_CHANNEL_COUNT && r_mm > r_max_mm * (1 + 1e-9); c++)
+        rgb[c] = 0;
+}
+
+static void whole_profile(const struct render_split *split, double r_mm, double rgb[IO_CHANNEL_COUNT])
+{
+    const double r_max_mm = split->source.table->rows[split->source.row].axis.r_max_mm;
+    double nearer[IO_CHANNEL_COUNT] = { 0 }, farther[IO_CHANNEL_COUNT] = { 0 };
+    from_table(&split->source, r_mm, rgb);
+    /* at the end of the table nothing more can be told, nor is much left */
+    const bool has_neighbours = split->source.spread_mm > 0 && r_mm * RENDER_FOOTPRINT_STRIDE <= r_max_mm;
+    if (has_neighbours) {
+        from_table(&split->source, r_mm / RENDER_FOOTPRINT_STRIDE, nearer);
+        from_table(&split->source, r_mm * RENDER_FOOTPRINT_STRIDE, farther);
+    }
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        rgb[c] = is_beyond ? 0 : rgb[c];
-        if (split->blurred[c] && r_mm <= split->blurred[c]->reach_mm)
-            rgb[c] = render_footprint_sample(split->blurred[c], r_mm);
+        const struct render_footprint *const averaged = split->averaged[c];
+        if (averaged && r_mm <= averaged->reach_mm)
+            rgb[c] = render_footprint_sample(averaged, r_mm);
+        else if (averaged && has_neighbours)
+            rgb[c] =
+                render_footprint_far_per_mm2(averaged, r_mm, (double[]){ nearer[c], rgb[c], farther[c] });
     }
 }
 
 /*
  * Taylor's polynomial of a channel in 1 - s/s_cap, s the distance squared: of the polynomial through
  * CAP_NODES Chebyshev nodes about the cap. The profile is completely monotonic in s, so all terms are
- * positive, and caps rise inwards, below the profile. One that is blurred (not NULL) has lobes: there it is
- * the polynomial, whatever its signs.
+ * positive, and caps rise inwards, below the profile. One that is averaged (not NULL) may have lobes:
+ * there it is the polynomial, whatever its signs.
  */
-static void fit_cap(const dipole_stack *stack, const struct render_footprint *blurred, double cap_mm,
+static void fit_cap(const dipole_stack *stack, const struct render_footprint *averaged, double cap_mm,
                     double terms[RENDER_CAP_TERMS])
 {
     enum { CAP_NODES = 7 };
@@ -71,9 +88,9 @@ static void fit_cap(const dipole_stack *stack, const struct render_footprint *bl
         x[i] = half_width * cos(PI * (i + 0.5) / CAP_NODES);
         r_mm[i] = cap_mm * sqrt(1 - x[i]);
     }
-    if (blurred) {
+    if (averaged) {
         for (int i = 0; i < CAP_NODES; i++)
-            divided[i] = render_footprint_exact_per_mm2(blurred, r_mm[i]);
+            divided[i] = render_footprint_exact_per_mm2(averaged, r_mm[i]);
     } else {
         dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, r_mm, CAP_NODES, divided);
     }
@@ -88,10 +105,10 @@ static void fit_cap(const dipole_stack *stack, const struct render_footprint *bl
         power[0] = divided[i] - x[i] * power[0];
     }
     for (int k = 0; k < RENDER_CAP_TERMS; k++)
-        terms[k] = blurred ? power[k] : fmax(power[k], 0);
+        terms[k] = averaged ? power[k] : fmax(power[k], 0);
 }
 
-/* Caps nearer than so many steps of a footprint (12 times its blur) are of the blurred profile. */
+/* Caps nearer than so many steps of a footprint (12 times its width) are of the averaged profile. */
 enum { NEAR_FOOTPRINT = 96 };
 
 /* All caps, scaled to meet the table. */
@@ -102,11 +119,11 @@ static void fit_caps(struct render_split *split)
         whole_profile(split, split->bands[b].cap_mm, at_cap);
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
             double *const terms = split->caps[b][c];
-            const struct render_footprint *const blurred = split->blurred[c];
+            const struct render_footprint *const averaged = split->averaged[c];
             if (at_cap[c] == 0)
                 continue;
-            if (blurred && split->bands[b].cap_mm < NEAR_FOOTPRINT * blurred->step_mm) {
-                fit_cap(NULL, blurred, split->bands[b].cap_mm, terms);
+            if (averaged && split->bands[b].cap_mm < NEAR_FOOTPRINT * averaged->step_mm) {
+                fit_cap(NULL, averaged, split->bands[b].cap_mm, terms);
                 terms[0] = at_cap[c];
                 continue;
             }
@@ -125,9 +142,9 @@ bool render_split_init(const struct render_band_source *source, const struct ren
     for (int b = 0; b < band_count; b++)
         split->bands[b] = bands[b];
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        if (source->blur_mm[c] > 0 &&
-            !render_footprint_create(source->medium->stacks[c], source->blur_mm[c], &split->blurred[c],
-                                     status))
+        const struct render_footprint_kernel kernel = { source->blur_mm[c], source->spread_mm };
+        if ((kernel.blur_mm > 0 || kernel.spread_mm > 0) &&
+            !render_footprint_create(source->medium->stacks[c], &kernel, &split->averaged[c], status))
             return false;
     }
     fit_caps(split);
@@ -137,7 +154,7 @@ bool render_split_init(const struct render_band_source *source, const struct ren
 void render_split_end(struct render_split *split)
 {
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
-        free(split->blurred[c]);
+        free(split->averaged[c]);
 }
 
 /* What a cap puts in place of the profile. */

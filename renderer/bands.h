@@ -24,13 +24,13 @@ struct render_band {
 int render_bands_make(double spacing_mm, double r_max_mm, double cap_spacings,
                       struct render_band bands[RENDER_BAND_LIMIT]);
 
-/* Where a medium's profile comes from: a row of a table, and where a channel's blur_mm > 0 its average
- * by footprint.h. */
+/* Where a medium's profile comes from: a row of a table, and where spread_mm or a channel's blur_mm > 0
+ * its average by footprint.h. */
 struct render_band_source {
     const struct lut_splat *table;
     size_t row;
     const struct render_medium *medium;
-    double blur_mm[IO_CHANNEL_COUNT];
+    double spread_mm, blur_mm[IO_CHANNEL_COUNT];
 };
 
 /* What tables of bands are made for. */
@@ -47,7 +47,7 @@ struct render_split {
     int band_count;
     struct render_band bands[RENDER_BAND_LIMIT];
     double caps[RENDER_BAND_LIMIT][IO_CHANNEL_COUNT][RENDER_CAP_TERMS]; /* in powers of 1 - (r/cap)^2 */
-    struct render_footprint *blurred[IO_CHANNEL_COUNT];                 /* NULL: the table's           */
+    struct render_footprint *averaged[IO_CHANNEL_COUNT];                /* NULL: the table's           */
 };
 
 /* Table and medium must outlive the split, which the caller ends with render_split_end, even on failure. */

@@ -18,7 +18,8 @@ struct cell {
     uint64_t code;
     int object; /* -1: a free slot */
     int texel_count;
-    double share, irradiance, moment[3], arriving[3];
+    double irradiance, arriving[3];
+    struct render_spread_sums sums;
     float min[3], max[3];
 };
 
@@ -101,11 +102,10 @@ static uint64_t code_of(const struct render_light_target *target, const float re
 
 static void add_texel(struct cell *cell, const float texel[4], double irradiance)
 {
-    cell->share += (double)texel[3];
+    render_spread_add(&cell->sums, (double)texel[3], (double)texel[0], (double)texel[1], (double)texel[2]);
     cell->irradiance += irradiance;
     cell->texel_count++;
     for (int k = 0; k < 3; k++) {
-        cell->moment[k] += (double)texel[3] * (double)texel[k];
         cell->min[k] = fminf(cell->min[k], texel[k]);
         cell->max[k] = fmaxf(cell->max[k], texel[k]);
     }
@@ -159,17 +159,20 @@ static bool append(struct render_light_samples *samples, const struct render_lig
 static bool append_cell(const struct render_light_target *targets, const struct render_light_view *view,
                         const struct cell *cell, dipole_status *status)
 {
-    const double flux = view->irradiance ? cell->irradiance / cell->texel_count : cell->share;
+    const double share = cell->sums.weight, texel_count = cell->texel_count;
+    const double flux = view->irradiance ? cell->irradiance / texel_count : share;
     struct render_light_sample sample = { .object = (float)cell->object };
     double diagonal2 = 0;
     for (int k = 0; k < 3; k++) {
         const double extent = (double)cell->max[k] - (double)cell->min[k];
         diagonal2 += extent * extent;
-        sample.position_mm[k] = (float)(cell->moment[k] / cell->share);
-        sample.flux_w[k] =
-            (float)(flux * view->rgb[k] * (view->shadows ? cell->arriving[k] / cell->share : 1));
+        sample.position_mm[k] = (float)(cell->sums.first[k] / share);
+        sample.flux_w[k] = (float)(flux * view->rgb[k] * (view->shadows ? cell->arriving[k] / share : 1));
     }
     sample.footprint_mm = (float)sqrt(diagonal2);
+    /* of texels as wide as they are, not of their middles alone */
+    render_spread_of(&cell->sums, texel_count > 1 ? texel_count / (texel_count - 1) : 0,
+                     targets[cell->object].spacing_mm, sample.spread_mm2);
     return append(targets[cell->object].samples, &sample, cell->code, status);
 }
 

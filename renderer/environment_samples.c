@@ -25,7 +25,8 @@ struct cell {
     uint64_t code; /* of the cube, on the curve                              */
     int face;      /* axis that the facets face most, times 2; plus 1: down it */
     float min_mm[3], max_mm[3];
-    double flux_w[3], moment[3], weight, area_mm2;
+    double flux_w[3], area_mm2;
+    struct render_spread_sums sums;
     struct render_patch largest;
 };
 
@@ -131,6 +132,17 @@ static uint64_t code_of(const struct render_patches *patches, const double posit
     return render_cube_code(position_mm, patches->min_mm, CUBE_SHARE * patches->spacing_mm);
 }
 
+/* Of a patch about its middle: a twelfth of its area, both ways along it, as a square's is. */
+static void add_own_spread(struct render_spread_sums *sums, double weight, const struct render_patch *patch)
+{
+    const double *const n = patch->facet_normal, along = weight * patch->area_mm2 / 12;
+    for (int k = 0; k < 3; k++) {
+        const int a = (k + 1) % 3, b = (k + 2) % 3;
+        sums->second[k] += along * (1 - n[k] * n[k]);
+        sums->second[3 + k] -= along * n[a] * n[b];
+    }
+}
+
 static bool put(struct render_patches *patches, const struct waiting *lit, dipole_status *status)
 {
     const struct render_patch *const patch = &lit->patch;
@@ -153,13 +165,14 @@ static bool put(struct render_patches *patches, const struct waiting *lit, dipol
     }
     struct cell *const cell = &patches->cells[patches->slots[slot] - 1];
     const double weight = patch->area_mm2 * (lit->rgb[0] + lit->rgb[1] + lit->rgb[2]);
-    cell->weight += weight;
+    render_spread_add(&cell->sums, weight, patch->position_mm[0], patch->position_mm[1],
+                      patch->position_mm[2]);
+    add_own_spread(&cell->sums, weight, patch);
     cell->area_mm2 += patch->area_mm2;
     if (!(patch->area_mm2 <= cell->largest.area_mm2))
         cell->largest = *patch;
     for (int k = 0; k < 3; k++) {
         cell->flux_w[k] += patch->area_mm2 * lit->rgb[k];
-        cell->moment[k] += weight * patch->position_mm[k];
         cell->min_mm[k] = patch->min_mm[k] < cell->min_mm[k] ? patch->min_mm[k] : cell->min_mm[k];
         cell->max_mm[k] = patch->max_mm[k] > cell->max_mm[k] ? patch->max_mm[k] : cell->max_mm[k];
     }
@@ -401,11 +414,12 @@ bool render_patches_finish(struct render_patches *patches, float object,
             continue;
         for (int k = 0; k < 3; k++) {
             const double width_mm = (double)cell->max_mm[k] - (double)cell->min_mm[k];
-            sample.position_mm[k] = (float)(cell->moment[k] / cell->weight);
+            sample.position_mm[k] = (float)(cell->sums.first[k] / cell->sums.weight);
             sample.flux_w[k] = (float)cell->flux_w[k];
             diagonal2 += width_mm * width_mm;
         }
         sample.footprint_mm = (float)sqrt(diagonal2);
+        render_spread_of(&cell->sums, 1, patches->spacing_mm, sample.spread_mm2);
         done = render_light_samples_add(samples, &sample, status);
     }
     return done;

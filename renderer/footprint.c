@@ -6,8 +6,9 @@
 #define PI 3.14159265358979323846
 
 enum {
-    STEPS = 8,   /* nodes and rings to a standard deviation: both sums then err by less than 1e-5 */
-    REACH = 32,  /* of the table, in standard deviations; beyond, the blur changes nothing        */
+    STEPS = 8,   /* nodes and rings to a standard deviation                                       */
+    REACH = 32,  /* of the table, in standard deviations; beyond, a spread changes little, a blur
+                    nothing */
     KERNEL = 10, /* of the kernel: six standard deviations of its widest Gaussian                 */
     GAUSSIANS = 3,
     SPECTRUM_STEPS = 6 /* to a factor of two in frequency      */
@@ -103,37 +104,48 @@ static double scaled_bessel_i0(double x)
     return sum / sqrt(x);
 }
 
-/* Mean of the kernel of blur 1 over a ring of radius s about a point at r. */
-static double kernel_over_ring(double r, double s)
+/* Mean of a Gaussian over a ring of radius s_mm about a point at r_mm. */
+static double gaussian_over_ring(double variance_mm2, double r_mm, double s_mm)
 {
-    double sum = 0;
-    for (int i = 0; i < GAUSSIANS; i++) {
-        const double variance = i + 1;
-        sum += gaussian_weights[i] * exp(-0.5 * (r - s) * (r - s) / variance) *
-               scaled_bessel_i0(r * s / variance) / (2 * PI * variance);
-    }
-    return sum;
+    return exp(-0.5 * (r_mm - s_mm) * (r_mm - s_mm) / variance_mm2) *
+           scaled_bessel_i0(r_mm * s_mm / variance_mm2) / (2 * PI * variance_mm2);
 }
 
-double render_footprint_kernel_per_mm2(double blur_mm, double r_mm, double s_mm)
+double render_footprint_kernel_per_mm2(const struct render_footprint_kernel *kernel, double r_mm,
+                                       double s_mm)
 {
-    return kernel_over_ring(r_mm / blur_mm, s_mm / blur_mm) / (blur_mm * blur_mm);
+    const double blur2_mm2 = kernel->blur_mm * kernel->blur_mm,
+                 spread2_mm2 = kernel->spread_mm * kernel->spread_mm;
+    if (!(blur2_mm2 > 0))
+        return gaussian_over_ring(spread2_mm2, r_mm, s_mm);
+    double sum = 0;
+    for (int i = 0; i < GAUSSIANS; i++)
+        sum += gaussian_weights[i] * gaussian_over_ring((i + 1) * blur2_mm2 + spread2_mm2, r_mm, s_mm);
+    return sum;
 }
 
 double render_footprint_exact_per_mm2(const struct render_footprint *footprint, double r_mm)
 {
-    const int near = (int)(r_mm / footprint->step_mm);
-    const int first = near > KERNEL * STEPS ? near - KERNEL * STEPS : 0;
-    const int last =
-        near + KERNEL * STEPS < footprint->ring_count ? near + KERNEL * STEPS : footprint->ring_count - 1;
-    const double blur_mm = footprint->step_mm * STEPS;
+    const int near = (int)(r_mm / footprint->step_mm), reach = KERNEL * STEPS;
+    const int first = near > reach ? near - reach : 0;
+    const int last = near + reach < footprint->ring_count ? near + reach : footprint->ring_count - 1;
     double sum = 0;
     for (int i = first; i <= last; i++)
-        sum += footprint->power[i] * kernel_over_ring(r_mm / blur_mm, (double)i / STEPS);
-    return sum / (blur_mm * blur_mm);
+        sum += footprint->power[i] *
+               render_footprint_kernel_per_mm2(&footprint->kernel, r_mm, i * footprint->step_mm);
+    return sum;
 }
 
-bool render_footprint_create(const dipole_stack *stack, double blur_mm,
+/* f + spread^2/2 (f'' + f'/r): in log r the second derivative over r^2. A blur has no second moment. */
+double render_footprint_far_per_mm2(const struct render_footprint *footprint, double r_mm,
+                                    const double profile_per_mm2[3])
+{
+    const double stride = log(RENDER_FOOTPRINT_STRIDE), *const f = profile_per_mm2;
+    const double ratio = footprint->kernel.spread_mm / (r_mm * stride);
+    return f[1] + 0.5 * ratio * ratio * (f[0] - 2 * f[1] + f[2]);
+}
+
+bool render_footprint_create(const dipole_stack *stack, const struct render_footprint_kernel *kernel,
                              struct render_footprint **footprint_out, dipole_status *status)
 {
     const int count = REACH * STEPS + 2, ring_count = (REACH + KERNEL) * STEPS + 1;
@@ -143,7 +155,7 @@ bool render_footprint_create(const dipole_stack *stack, double blur_mm,
     if (!footprint)
         return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a profile of %d nodes",
                            count);
-    const double step_mm = blur_mm / STEPS;
+    const double step_mm = hypot(kernel->blur_mm, kernel->spread_mm) / STEPS;
     double *const power = footprint->values_per_mm2 + count;
     double within = 0;
     for (int i = 0; i < ring_count; i++) { /* the rings about i steps; the first is a disc */
@@ -151,7 +163,8 @@ bool render_footprint_create(const dipole_stack *stack, double blur_mm,
         power[i] = fmax(next - within, 0);
         within = next;
     }
-    *footprint = (struct render_footprint){ .step_mm = step_mm,
+    *footprint = (struct render_footprint){ .kernel = *kernel,
+                                            .step_mm = step_mm,
                                             .reach_mm = (count - 2) * step_mm,
                                             .count = count,
                                             .ring_count = ring_count,

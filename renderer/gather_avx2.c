@@ -97,7 +97,7 @@ static inline __attribute__((always_inline)) void sum_all(const struct render_ga
         const __m256 along =
             _mm256_fmadd_ps(dx, row_x, _mm256_fmadd_ps(dy, row_y, _mm256_mul_ps(dz, row_z)));
         const __m256 slope = pick(kernel->slope, piece);
-        const float trace = m[0] + m[1] + m[2];
+        const float trace = m[0] + m[1] + m[2] + kernel->averaged_mm2;
         const __m256 first = _mm256_mul_ps(slope, _mm256_set1_ps(trace));
         const __m256 second =
             _mm256_mul_ps(_mm256_mul_ps(slope, slope), _mm256_mul_ps(_mm256_set1_ps(4), along));

@@ -109,6 +109,7 @@ static void write_kernel(const struct render_gather_kernel *kernel, float *texel
 {
     texels[0] = kernel->inverse_per_mm2;
     texels[1] = kernel->reach2_mm2;
+    texels[2] = kernel->averaged_mm2;
     memcpy(texels + 4, kernel->lost_per_mm2, sizeof kernel->lost_per_mm2);
     for (int p = 0; p < RENDER_GATHER_PIECES; p++) {
         for (int c = 0; c < IO_CHANNEL_COUNT; c++) {

@@ -63,7 +63,8 @@ static bool find_piece(const struct render_gather_kernel *kernel, const float st
     memcpy(&at->t, &bits, sizeof at->t);
     at->t -= 1.25f;
     at->slope = kernel->slope[at->column];
-    at->trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2];
+    /* of what is averaged along the surface already, the third way is none */
+    at->trace = spread_mm2[0] + spread_mm2[1] + spread_mm2[2] + kernel->averaged_mm2;
     at->first = at->slope * at->trace;
     at->second = 4 * at->slope * at->slope * spread_along(step_mm, spread_mm2);
     return true;
@@ -111,7 +112,8 @@ static void power_of(const struct render_split *split, int band, const struct re
                      double spread_mm2, double power[IO_CHANNEL_COUNT])
 {
     enum { STEPS = 256 };
-    const float m = (float)spread_mm2, spread[6] = { m, m, 0, 0, 0, 0 };
+    const float m = (float)spread_mm2, across = kernel ? -kernel->averaged_mm2 : 0,
+                spread[6] = { m, m, across, 0, 0, 0 };
     for (int c = 0; c < IO_CHANNEL_COUNT; c++)
         power[c] = 0;
     for (int i = 0; i < STEPS; i++) {
@@ -170,7 +172,9 @@ void render_gather_kernel_init(const struct render_split *split, int band,
     const double width_mm = fmax(planned->r_outer_mm, 2 * planned->cap_mm);
     const double inverse = 12 / (width_mm * width_mm);
     *kernel =
-        (struct render_gather_kernel){ .inverse_per_mm2 = (float)inverse,
+        (struct render_gather_kernel){ .averaged_mm2 =
+                                           (float)(split->source.spread_mm * split->source.spread_mm),
+                                       .inverse_per_mm2 = (float)inverse,
                                        .reach2_mm2 = (float)(planned->r_outer_mm * planned->r_outer_mm) };
     for (int p = 0; p < RENDER_GATHER_PIECES; p++) {
         kernel->slope[column(p)] = (float)ldexp(inverse, -(p / 2));

@@ -20,7 +20,8 @@ enum { RENDER_GATHER_LANES = 8, RENDER_GATHER_PIECES = 8, RENDER_GATHER_TERMS = 
 struct render_gather_kernel {
     float inverse_per_mm2, reach2_mm2;
     float lost_per_mm2[IO_CHANNEL_COUNT]; /* of the power, for each mm^2 of spread, and given back */
-    bool is_grey;                         /* the same in all channels: one need be looked up */
+    float averaged_mm2; /* the profile is averaged over this variance, each way along the surface */
+    bool is_grey;       /* the same in all channels: one need be looked up */
     _Alignas(32) float slope[RENDER_GATHER_PIECES]; /* of the mantissa, per mm^2 of the distance squared */
     _Alignas(32) float terms[IO_CHANNEL_COUNT][RENDER_GATHER_TERMS][RENDER_GATHER_PIECES];
 };
@@ -47,7 +48,8 @@ struct render_gather_places {
 };
 
 /* Light that enters about a point: flux, mean position, and how far it is spread: the mean of d d^T, d the
- * distance from the mean position, all weighted by flux. */
+ * distance from the mean position, all weighted by flux, less what the profile is averaged over:
+ * averaged_mm2 on the diagonal. */
 struct render_gather_source {
     float position_mm[3];
     float flux_w[IO_CHANNEL_COUNT];

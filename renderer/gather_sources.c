@@ -215,6 +215,7 @@ struct workshop {
     uint64_t *codes;
     struct render_z_key *keys, *spare;
     int order_bits;
+    float averaged_mm2;
     struct part parts[PART_LIMIT];
     int part_count;
     struct render_gather_sources *out;
@@ -256,9 +257,11 @@ static void merge_part(void *context, int index)
         const struct render_z_key *const key = &shop->order[part->first + i];
         const struct render_light_sample *const sample = &shop->samples[key->index];
         codes[i] = key->code;
-        sources[i] = (struct render_gather_source){ .spread_mm2 = { 0 } };
         memcpy(sources[i].position_mm, sample->position_mm, sizeof sample->position_mm);
         memcpy(sources[i].flux_w, sample->flux_w, sizeof sample->flux_w);
+        memcpy(sources[i].spread_mm2, sample->spread_mm2, sizeof sample->spread_mm2);
+        for (int k = 0; k < 3; k++)
+            sources[i].spread_mm2[k] -= shop->averaged_mm2;
     }
     for (int b = 0; b < shop->out->band_count; b++) {
         count = merge(sources, codes, count, shift_of(shop, b));
@@ -297,7 +300,7 @@ static bool fill_levels(struct workshop *shop, const uint64_t *codes, int code_l
 
 bool render_gather_sources_init(const struct render_light_sample *samples, const uint64_t *codes,
                                 int code_level, size_t count, const struct render_band *bands,
-                                int band_count, struct render_gather_sources *sources,
+                                int band_count, double averaged_mm, struct render_gather_sources *sources,
                                 dipole_status *status)
 {
     *sources = (struct render_gather_sources){ .band_count = band_count };
@@ -308,6 +311,7 @@ bool render_gather_sources_init(const struct render_light_sample *samples, const
                              .codes = malloc(count * sizeof *shop.codes),
                              .keys = malloc(count * sizeof *shop.keys),
                              .spare = malloc(count * sizeof *shop.spare),
+                             .averaged_mm2 = (float)(averaged_mm * averaged_mm),
                              .out = sources };
     const bool done = shop.sources && shop.codes && shop.keys && shop.spare &&
                       fill_levels(&shop, codes, code_level, count, bands[0].spacing_mm);

@@ -27,12 +27,13 @@ struct render_gather_sources {
 
 /* Samples are merged in cubes as wide as each band's spacing. codes: of each sample the cube of
  * cell_samples.h that it is of, which is merged with its neighbours at rest instead, 2^band to a side, so
- * that the same samples are merged however the object moves; NULL: by where they are. Fails with
+ * that the same samples are merged however the object moves; NULL: by where they are. averaged_mm: what the
+ * profile is averaged over, render_band_source's spread_mm. Fails with
  * DIPOLE_OUT_OF_MEMORY; end them with render_gather_sources_end in any case. */
 DIPOLE_CHECKED bool render_gather_sources_init(const struct render_light_sample *samples,
                                                const uint64_t *codes, int code_level, size_t count,
                                                const struct render_band *bands, int band_count,
-                                               struct render_gather_sources *sources,
+                                               double averaged_mm, struct render_gather_sources *sources,
                                                dipole_status *status);
 void render_gather_sources_end(struct render_gather_sources *sources);
 

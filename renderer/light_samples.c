@@ -169,37 +169,63 @@ bool render_light_samples_add_all(struct render_light_samples *samples,
     return true;
 }
 
+/* Rows and columns of the second moments. */
+static const int moment_axes[6][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 1, 2 }, { 2, 0 }, { 0, 1 } };
+
+void render_spread_of(const struct render_spread_sums *sums, double scale, double spacing_mm,
+                      float spread_mm2[6])
+{
+    const double limit_mm2 = 0.25 * spacing_mm * spacing_mm; /* a square has a sixth */
+    double moments_mm2[6];
+    for (int m = 0; m < 6; m++) {
+        const double a = sums->first[moment_axes[m][0]] / sums->weight,
+                     b = sums->first[moment_axes[m][1]] / sums->weight;
+        moments_mm2[m] = scale * (sums->second[m] / sums->weight - a * b);
+    }
+    const double trace_mm2 = moments_mm2[0] + moments_mm2[1] + moments_mm2[2];
+    for (int m = 0; m < 6; m++)
+        spread_mm2[m] = (float)(moments_mm2[m] * (trace_mm2 > limit_mm2 ? limit_mm2 / trace_mm2 : 1));
+}
+
+/* Of the spread of so many texels to that of their middles: both ways together. */
+static double whole_texels(struct block block)
+{
+    const double squares = (double)block.width * block.width + (double)block.height * block.height;
+    return squares > 2 ? squares / (squares - 2) : 0;
+}
+
 static bool append_block(const struct reducer *reducer, struct block block, double extent_mm)
 {
     const struct render_light_view *const view = reducer->view;
-    double share = 0, irradiance = 0, moment[3] = { 0, 0, 0 }, arriving[3] = { 0, 0, 0 };
+    struct render_spread_sums sums = { .weight = 0 };
+    double irradiance = 0, arriving[3] = { 0, 0, 0 };
     int lit_count = 0;
     for (int y = block.y; y < block.y + block.height; y++) {
         for (int x = block.x; x < block.x + block.width; x++) {
             const float *const t = lit_texel(reducer, x, y);
             if (!t)
                 continue;
-            share += (double)t[3];
+            render_spread_add(&sums, (double)t[3], (double)t[0], (double)t[1], (double)t[2]);
             lit_count++;
             if (view->irradiance)
                 irradiance += (double)view->irradiance[(size_t)y * (size_t)view->size_px + (size_t)x];
-            for (int k = 0; k < 3; k++)
-                moment[k] += (double)t[3] * (double)t[k];
             render_light_view_add_shadow(view, x, y, (double)t[3], arriving);
         }
     }
+    const double share = sums.weight;
     if (!(share > 0))
         return true;
     const double factor = view->flux_factor > 0 ? view->flux_factor : 1;
     struct render_light_sample sample = { .footprint_mm = (float)extent_mm,
                                           .object = (float)reducer->object };
     for (int k = 0; k < 3; k++) {
-        sample.position_mm[k] = (float)(moment[k] / share);
+        sample.position_mm[k] = (float)(sums.first[k] / share);
         sample.flux_w[k] =
             (float)((view->irradiance ? irradiance / lit_count : share) * factor * view->rgb[k]);
         if (view->shadows)
             sample.flux_w[k] *= (float)(arriving[k] / share);
     }
+    render_spread_of(&sums, whole_texels(block), reducer->limit_mm, sample.spread_mm2);
     return render_light_samples_add(reducer->targets[reducer->object].samples, &sample, reducer->status);
 }
 
@@ -580,29 +606,35 @@ static double weight_of(const struct render_light_sample *sample)
 struct render_light_sample render_light_samples_merge_run(const struct render_light_samples *samples,
                                                           const struct render_z_key *keys, size_t count)
 {
-    double flux_w[3] = { 0, 0, 0 }, moment[3] = { 0, 0, 0 }, weight_sum = 0, diagonal2 = 0;
+    double flux_w[3] = { 0, 0, 0 }, spread_mm2[6] = { 0 }, diagonal2 = 0;
+    struct render_spread_sums sums = { .weight = 0 };
     float min[3], max[3], footprint_mm = 0;
     for (int k = 0; k < 3; k++)
         min[k] = max[k] = samples->samples[keys[0].index].position_mm[k];
     for (size_t i = 0; i < count; i++) {
         const struct render_light_sample *const sample = &samples->samples[keys[i].index];
         const double weight = weight_of(sample);
-        weight_sum += weight;
+        render_spread_add(&sums, weight, (double)sample->position_mm[0], (double)sample->position_mm[1],
+                          (double)sample->position_mm[2]);
+        for (int m = 0; m < 6; m++)
+            spread_mm2[m] += weight * (double)sample->spread_mm2[m];
         footprint_mm = fmaxf(footprint_mm, sample->footprint_mm);
         for (int k = 0; k < 3; k++) {
             flux_w[k] += (double)sample->flux_w[k];
-            moment[k] += weight * (double)sample->position_mm[k];
             min[k] = fminf(min[k], sample->position_mm[k]);
             max[k] = fmaxf(max[k], sample->position_mm[k]);
         }
     }
     struct render_light_sample merged = { .object = keys[0].object };
     for (int k = 0; k < 3; k++) {
-        merged.position_mm[k] = (float)(moment[k] / weight_sum);
+        merged.position_mm[k] = (float)(sums.first[k] / sums.weight);
         merged.flux_w[k] = (float)flux_w[k];
         diagonal2 += (double)(max[k] - min[k]) * (double)(max[k] - min[k]);
     }
     merged.footprint_mm = (float)sqrt(diagonal2) + footprint_mm;
+    render_spread_of(&sums, 1, INFINITY, merged.spread_mm2);
+    for (int m = 0; m < 6; m++)
+        merged.spread_mm2[m] += (float)(spread_mm2[m] / sums.weight);
     return merged;
 }
 

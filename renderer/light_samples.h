@@ -10,13 +10,40 @@
 
 #include <stdint.h>
 
-/* Light that enters through one patch of surface. Two texels of a buffer. */
+/* Light that enters through one patch of surface. */
 struct render_light_sample {
     float position_mm[3]; /* flux-weighted mean of the patch          */
     float footprint_mm;   /* largest extent of the patch              */
     float flux_w[3];      /* transmitted power per channel, in W      */
     float object;         /* whose surface it is; 0 without object ids */
+    float spread_mm2[6];  /* mean of d d^T, weighted alike, d from position_mm: xx yy zz yz zx xy */
 };
+
+/* Weighted sums of positions, from which mean and spread follow. */
+struct render_spread_sums {
+    double weight, first[3], second[6];
+};
+
+static inline void render_spread_add(struct render_spread_sums *sums, double weight, double x_mm,
+                                     double y_mm, double z_mm)
+{
+    const double x = weight * x_mm, y = weight * y_mm, z = weight * z_mm;
+    sums->weight += weight;
+    sums->first[0] += x;
+    sums->first[1] += y;
+    sums->first[2] += z;
+    sums->second[0] += x * x_mm;
+    sums->second[1] += y * y_mm;
+    sums->second[2] += z * z_mm;
+    sums->second[3] += y * z_mm;
+    sums->second[4] += z * x_mm;
+    sums->second[5] += x * y_mm;
+}
+
+/* Times scale; less where that is more than patches of spacing_mm have, as where texels lie at two depths.
+ */
+void render_spread_of(const struct render_spread_sums *sums, double scale, double spacing_mm,
+                      float spread_mm2[6]);
 
 struct render_light_samples {
     struct render_light_sample *samples;

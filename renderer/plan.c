@@ -113,10 +113,11 @@ struct render_band_key render_plan_band_key(const struct render_plan *plan,
                                             const struct render_table *table, size_t medium)
 {
     const struct render_plan_medium *const planned = &plan->of_medium[medium];
-    struct render_band_key key = {
-        .source = { .table = table->lut, .row = table->row, .medium = &plan->media->media[medium] },
-        .band_count = planned->band_count
-    };
+    struct render_band_key key = { .source = { .table = table->lut,
+                                               .row = table->row,
+                                               .medium = &plan->media->media[medium],
+                                               .spread_mm = planned->spread_mm },
+                                   .band_count = planned->band_count };
     memcpy(key.source.blur_mm, planned->blur_mm, sizeof key.source.blur_mm);
     memcpy(key.bands, planned->bands, sizeof key.bands);
     return key;

@@ -192,6 +192,7 @@ struct render_plan_medium {
     double wanted_mm;                 /* spacing of light samples that epsilon asks for   */
     double spacing_mm;                /* of the finest: as wanted, or as many as may be   */
     double blur_mm[IO_CHANNEL_COUNT]; /* of the profile, so that they do not show; 0: none is needed */
+    double spread_mm;                 /* of the light that is put together in one, T79; 0 of a grid */
     struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
     int band_count;
     double inner_mm; /* of the pattern of samples of translucent shadow maps     */

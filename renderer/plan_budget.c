@@ -261,6 +261,19 @@ static void blur_channels(const struct render_plan *plan, const struct render_me
     }
 }
 
+/* Of the medium's visible objects, which may be of several sizes: each sample's own spread makes up for
+ * what others ask for, but not next to it if the profile is averaged too far. */
+static double closest_spacing_mm(const struct render_plan *plan, size_t medium, double texel_mm)
+{
+    double closest_mm = plan->of_medium[medium].spacing_mm;
+    for (size_t i = 0; i < plan->media->object_count; i++) {
+        const struct render_plan_object *const object = &plan->objects[i];
+        if (object->medium == medium && object->spacing_mm > 0)
+            closest_mm = fmin(closest_mm, object->spacing_mm);
+    }
+    return fmax(closest_mm, texel_mm);
+}
+
 static void settle_medium(const struct render_request *request, struct render_plan *plan, size_t index,
                           double texel_mm)
 {
@@ -281,6 +294,9 @@ static void settle_medium(const struct render_request *request, struct render_pl
         (is_gathered ? render_gather_finest_spacings(plan->banding_epsilon) : 1) * planned->spacing_mm;
     const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
     const double on_slopes_mm = spacing_mm * fmin(fmax(spacing_mm / wanted_mm, 1), SLOPE_LIMIT);
+    planned->spread_mm = !is_gathered || request->is_captured
+                             ? 0
+                             : RENDER_FOOTPRINT_SPREAD * closest_spacing_mm(plan, index, texel_mm);
     planned->aliasing_error =
         request->is_captured ? 0 : worst(medium, render_footprint_aliasing, on_slopes_mm, 0);
     if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))

@@ -5,6 +5,7 @@
 #include "renderer/splats.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -315,9 +316,13 @@ static bool fill_table(struct render_splatter *splatter, const struct render_fra
     return done;
 }
 
-/* What is drawn: samples one band after the other, and splats of them. */
+/* Of a sample: position, footprint; flux, object. */
+enum { SAMPLE_TEXELS = 2, SAMPLE_FLOATS = 4 * SAMPLE_TEXELS };
+_Static_assert(offsetof(struct render_light_sample, spread_mm2) == SAMPLE_FLOATS * sizeof(float), "texels");
+
+/* What is drawn: texels of samples, one band after the other, and splats of them. */
 struct batch {
-    struct render_light_sample *samples;
+    float *texels;
     size_t sample_count, sample_capacity;
     struct render_splats splats;
 };
@@ -327,17 +332,16 @@ static bool add_samples(struct batch *batch, const struct render_light_samples *
 {
     if (batch->sample_capacity - batch->sample_count < samples->count) {
         const size_t capacity = batch->sample_count + samples->count + batch->sample_capacity / 2;
-        struct render_light_sample *const grown = realloc(batch->samples, capacity * sizeof *grown);
+        float *const grown = realloc(batch->texels, capacity * SAMPLE_FLOATS * sizeof *grown);
         if (!grown)
             return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
                                capacity);
-        batch->samples = grown;
+        batch->texels = grown;
         batch->sample_capacity = capacity;
     }
-    if (samples->count > 0)
-        memcpy(batch->samples + batch->sample_count, samples->samples,
-               samples->count * sizeof *samples->samples);
-    batch->sample_count += samples->count;
+    for (size_t i = 0; i < samples->count; i++)
+        memcpy(batch->texels + batch->sample_count++ * SAMPLE_FLOATS, &samples->samples[i],
+               SAMPLE_FLOATS * sizeof *batch->texels);
     return true;
 }
 
@@ -396,17 +400,17 @@ static bool check_size(const struct batch *batch, dipole_status *status)
 {
     GLint texel_limit = 0;
     glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texel_limit);
-    return 2 * batch->sample_count <= (size_t)texel_limit ||
+    return SAMPLE_TEXELS * batch->sample_count <= (size_t)texel_limit ||
            dipole_fail(status, DIPOLE_NOT_SUPPORTED, NULL,
                        "%zu light samples, this OpenGL takes %d: a larger epsilon needs fewer",
-                       batch->sample_count, texel_limit / 2);
+                       batch->sample_count, texel_limit / SAMPLE_TEXELS);
 }
 
 static void draw_batch(struct render_splatter *splatter, const struct render_frame *frame,
                        const struct batch *batch)
 {
-    render_buffer_texture_fill(&splatter->sample_buffer, GL_RGBA32F, batch->samples,
-                               batch->sample_count * sizeof *batch->samples);
+    render_buffer_texture_fill(&splatter->sample_buffer, GL_RGBA32F, batch->texels,
+                               batch->sample_count * SAMPLE_FLOATS * sizeof *batch->texels);
     render_bind_buffer(frame, "light_samples", UNIT_SAMPLES, &splatter->sample_buffer);
     render_bind_buffer(frame, "profile_table", UNIT_TABLE, &splatter->table_buffer);
     render_set_int(frame->program, "profile_last_node", RENDER_BAND_NODES - 1);
@@ -435,7 +439,7 @@ bool render_splatter_draw(struct render_splatter *splatter, const struct render_
     splatter->splat_count += batch.splats.count;
     if (done && batch.splats.count > 0)
         draw_batch(splatter, frame, &batch);
-    free(batch.samples);
+    free(batch.texels);
     render_splats_destroy(&batch.splats);
     return done;
 }

@@ -67,7 +67,8 @@ static double fine_blurred(const struct fine *fine, double blur_mm, double r_mm)
     double sum = 0;
     for (int i = 0; i < FINE; i++)
         sum += 2 * pi * fine->s_mm[i] * fine->s_mm[i] * fine->step * fine->profile[i] *
-               render_footprint_kernel_per_mm2(blur_mm, r_mm, fine->s_mm[i]);
+               render_footprint_kernel_per_mm2(&(struct render_footprint_kernel){ .blur_mm = blur_mm },
+                                               r_mm, fine->s_mm[i]);
     return sum;
 }
 
@@ -94,7 +95,8 @@ static void it_is_the_average_by_definition(void **state)
             double *const values = values_create(blur);
             struct render_footprint *footprint;
             dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, blur->node_r_mm, blur->node_count, values);
-            assert_true(render_footprint_create(stack, blurs_mm[b], &footprint, NULL));
+            assert_true(render_footprint_create(
+                stack, &(struct render_footprint_kernel){ .blur_mm = blurs_mm[b] }, &footprint, NULL));
             fine_init(fine, stack, blurs_mm[b]);
             const double brightest = fine_blurred(fine, blurs_mm[b], 0);
             for (size_t i = 0; i < blur->row_count && rows[i] < 30 * blurs_mm[b]; i += 3) {

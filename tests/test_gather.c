@@ -83,7 +83,7 @@ static float *gathered_by(const struct scenery *scenery, const uint64_t *codes, 
     float *const radiosity = calloc(SIDE_PX * SIDE_PX, 4 * sizeof *radiosity);
     struct render_gather_sources sources;
     assert_true(render_gather_sources_init(scenery->samples, codes, 0, scenery->sample_count,
-                                           scenery->bands, scenery->band_count, &sources, NULL));
+                                           scenery->bands, scenery->band_count, 0, &sources, NULL));
     const struct render_gather_object object = { &scenery->medium, &sources, scenery->pixel_mm };
     const struct render_gather_request request = { .width_px = SIDE_PX,
                                                    .height_px = SIDE_PX,
@@ -198,6 +198,70 @@ static void kernels_follow_the_bands(void **state)
         render_split_end(&split);
         profile_end(&profile);
     }
+}
+
+/* Mean over a patch in the plane z = 0, whose middle is at 0. */
+static double patch_mean_per_mm2(const dipole_stack *stack, const double extents_mm[2],
+                                 const float place_mm[3])
+{
+    enum { PARTS = 24 };
+    double r_mm[PARTS * PARTS], values[PARTS * PARTS], sum = 0;
+    for (int i = 0; i < PARTS * PARTS; i++) {
+        const double x = extents_mm[0] * ((i % PARTS + 0.5) / PARTS - 0.5) - (double)place_mm[0],
+                     y = extents_mm[1] * ((0.5 + i / PARTS) / PARTS - 0.5) - (double)place_mm[1];
+        r_mm[i] = sqrt(x * x + y * y + (double)place_mm[2] * (double)place_mm[2]);
+    }
+    dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, r_mm, PARTS * PARTS, values);
+    for (int i = 0; i < PARTS * PARTS; i++)
+        sum += values[i] / (PARTS * PARTS);
+    return sum;
+}
+
+/* Oracle: the integral over the patch. One sample in its middle that knows how far it is spread is nearer
+ * to it than one that does not: along the patch, behind it, and between. theory.md T79. */
+static void a_patch_is_more_than_a_point(void **state)
+{
+    (void)state;
+    struct test_profile profile;
+    struct render_band bands[RENDER_BAND_LIMIT];
+    profile_init(&profile, "marble", DIPOLE_MODEL_DIPOLE, 0.01);
+    const double h_mm = profile.spacing_mm;
+    const double extents_mm[3][2] = { { 0.7 * h_mm, 0.7 * h_mm }, { h_mm, 0.5 * h_mm }, { h_mm, h_mm } };
+    const int count = render_bands_make(0.7 * h_mm, profile.r_max_mm, 2, bands);
+    double square[2] = { 0, 0 };
+    for (int is_spread = 0; is_spread < 2; is_spread++) {
+        struct render_gather_medium medium;
+        profile.source.spread_mm = is_spread ? RENDER_FOOTPRINT_SPREAD * h_mm : 0;
+        const double averaged_mm2 = profile.source.spread_mm * profile.source.spread_mm;
+        assert_true(render_gather_medium_init(&profile.source, bands, count, &medium, NULL));
+        struct rng rng = { .seed = 11 };
+        for (int trial = 0; trial < 600; trial++) {
+            const double *const e = extents_mm[trial % 3];
+            float spread_mm2[6] = { 0 }, place_mm[3];
+            double length2 = 0, way[3], found = 0;
+            for (int k = 0; k < 3; k++) {
+                way[k] = uniform(&rng, -1, 1);
+                if (k == 2 && trial % 2 == 0)
+                    way[k] = 0;
+                length2 += way[k] * way[k];
+                if (is_spread)
+                    spread_mm2[k] = (float)((k < 2 ? e[k] * e[k] / 12 : 0) - averaged_mm2);
+            }
+            const double r_mm = h_mm * uniform(&rng, 1, 6);
+            for (int k = 0; k < 3; k++)
+                place_mm[k] = (float)(r_mm * way[k] / sqrt(length2));
+            for (int b = 0; b < count; b++) {
+                float rgb[3];
+                render_gather_kernel_at(&medium.kernels[b], place_mm, spread_mm2, rgb);
+                found += (double)rgb[1];
+            }
+            const double expected = patch_mean_per_mm2(profile.medium.stacks[1], e, place_mm);
+            square[is_spread] += pow(found / expected - 1, 2) / 600;
+        }
+    }
+    print_message("  points are off by %.2g, patches by %.2g\n", sqrt(square[0]), sqrt(square[1]));
+    assert_true(sqrt(square[1]) < 0.25 * sqrt(square[0]));
+    profile_end(&profile);
 }
 
 /* Oracle: the portable loops. Those of this processor choose the same sources, and sum the same to float's
@@ -385,7 +449,7 @@ static void check_moments(bool has_codes)
     const int count = render_bands_make(0.3, 60, 2, bands);
     uint64_t *const codes = has_codes ? codes_at_rest(samples, COUNT_OF_SAMPLES, 0.3) : NULL;
     assert_true(
-        render_gather_sources_init(samples, codes, 0, COUNT_OF_SAMPLES, bands, count, &sources, NULL));
+        render_gather_sources_init(samples, codes, 0, COUNT_OF_SAMPLES, bands, count, 0, &sources, NULL));
     for (int b = -1; b < count; b++) {
         double sums[10] = { 0 };
         const size_t source_count = b < 0 ? COUNT_OF_SAMPLES : sources.levels[b].source_count;
@@ -447,8 +511,8 @@ static void the_tree_misses_nothing(void **state)
             }
         }
         const int band_count = render_bands_make(0.01, 60, 2, bands);
-        assert_true(
-            render_gather_sources_init(samples, NULL, 0, (size_t)count, bands, band_count, &sources, NULL));
+        assert_true(render_gather_sources_init(samples, NULL, 0, (size_t)count, bands, band_count, 0,
+                                               &sources, NULL));
         for (int trial = 0; trial < 50; trial++) {
             struct render_gather_box box;
             const float reach_mm = (float)log_uniform(&rng, 0.1, 30);
@@ -655,9 +719,9 @@ static void light_stays_in_its_object(void **state)
     struct render_gather_sources lit, dark;
     scenery_init(&scenery, "marble", DIPOLE_MODEL_DIPOLE, 20, 0.003);
     assert_true(render_gather_sources_init(scenery.samples, NULL, 0, scenery.sample_count, scenery.bands,
-                                           scenery.band_count, &lit, NULL));
+                                           scenery.band_count, 0, &lit, NULL));
     assert_true(
-        render_gather_sources_init(NULL, NULL, 0, 0, scenery.bands, scenery.band_count, &dark, NULL));
+        render_gather_sources_init(NULL, NULL, 0, 0, scenery.bands, scenery.band_count, 0, &dark, NULL));
     for (int i = 0; i < SIDE_PX * SIDE_PX; i++) {
         if (scenery.position_mm[4 * i + 3] > 0)
             scenery.position_mm[4 * i + 3] =
@@ -691,6 +755,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kernels_follow_the_bands),
+        cmocka_unit_test(a_patch_is_more_than_a_point),
         cmocka_unit_test(grey_is_summed_once),
         cmocka_unit_test(loops_agree),
         cmocka_unit_test(slopes_are_differences),

@@ -96,6 +96,39 @@ static void a_facing_plane_gives_one_sample_per_cell(void **state)
     render_light_samples_destroy(&samples);
 }
 
+/* Oracle: moments of a rectangle, h^2/12 along each side and (s h)^2/12 in depth, of whole texels. A jump
+ * in depth within a block counts for no more than samples may be apart. */
+static void samples_know_how_far_they_are_spread(void **state)
+{
+    (void)state;
+    static float texels[4 * SIDE * SIDE];
+    const double wide_mm = TEXEL_MM * (1 << LEVELS), slope = 0.5;
+    fill_plane(texels, slope, 0);
+    struct render_light_samples samples = reduce(texels, 2 * wide_mm);
+    const double square_mm2 = wide_mm * wide_mm / 12;
+    const double expected[6] = { square_mm2, square_mm2,         slope * slope * square_mm2,
+                                 0,          slope * square_mm2, 0 };
+    for (size_t i = 0; i < samples.count; i++) {
+        for (int m = 0; m < 6; m++)
+            assert_true(fabs((double)samples.samples[i].spread_mm2[m] - expected[m]) < 1e-4 * square_mm2);
+    }
+    render_light_samples_destroy(&samples);
+    for (int i = 0; i < SIDE * SIDE; i++)
+        texels[4 * i + 3] = 0; /* but for two texels of a block that share no line */
+    for (int corner = 0; corner < 2; corner++) {
+        float *const t = texels + (size_t)4 * (size_t)(corner * (SIDE + 1));
+        t[2] = 1000.0f * (float)corner;
+        t[3] = 1;
+    }
+    samples = reduce(texels, wide_mm);
+    double trace_mm2 = 0;
+    assert_int_equal(samples.count, 1);
+    for (int m = 0; m < 3; m++)
+        trace_mm2 += (double)samples.samples[0].spread_mm2[m];
+    assert_close(trace_mm2, 0.25 * wide_mm * wide_mm, 1e-3, "bounded");
+    render_light_samples_destroy(&samples);
+}
+
 /* Oracle: on a plane of slope s a block is sqrt(1 + s^2) longer along the slope, and is halved until it is
  * as short as the spacing: 2, 4, 8 samples beyond 45, 75.5, 82.8 degrees... and one just below each. */
 static void a_sloped_plane_gives_more_samples(void **state)
@@ -345,6 +378,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(flux_and_its_middle_are_conserved),
         cmocka_unit_test(a_facing_plane_gives_one_sample_per_cell),
+        cmocka_unit_test(samples_know_how_far_they_are_spread),
         cmocka_unit_test(a_sloped_plane_gives_more_samples),
         cmocka_unit_test(patches_are_no_wider_than_the_spacing),
         cmocka_unit_test(a_jump_is_not_bridged),

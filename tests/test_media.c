@@ -264,7 +264,8 @@ static void a_blurred_profile_keeps_its_energy(void **state)
         assert_true(dipole_stack_create(material.layers[0], material.layer_count, material.model,
                                         DIPOLE_FROM_ABOVE, &stack, NULL));
         struct render_footprint *footprint;
-        assert_true(render_footprint_create(stack, 0.05, &footprint, NULL));
+        assert_true(render_footprint_create(stack, &(struct render_footprint_kernel){ .blur_mm = 0.05 },
+                                            &footprint, NULL));
         enum { STEPS = 4000 };
         const double step_mm = footprint->reach_mm / STEPS;
         double sum = 0;
@@ -281,6 +282,78 @@ static void a_blurred_profile_keeps_its_energy(void **state)
         free(footprint);
         dipole_stack_destroy(stack);
     }
+}
+
+/* The profile averaged over what a patch spreads; NULL: not averaged. */
+static double spread_per_mm2(const dipole_stack *stack, const struct render_footprint *footprint,
+                             double r_mm)
+{
+    const double stride = RENDER_FOOTPRINT_STRIDE, three_mm[3] = { r_mm / stride, r_mm, r_mm * stride };
+    double profile[3];
+    if (footprint && r_mm <= footprint->reach_mm)
+        return render_footprint_sample(footprint, r_mm);
+    dipole_stack_profile_per_mm2(stack, DIPOLE_FACE_LIT, three_mm, 3, profile);
+    return footprint ? render_footprint_far_per_mm2(footprint, r_mm, profile) : profile[1];
+}
+
+/* Radiosity at x_mm of a plane that is lit with 1 W/mm^2 where x > 0, light put together in the middle of
+ * what is lit of cells cell_mm wide, the lines between which are u and v of a cell away from the edge. */
+static double radiosity_by_cells(const dipole_stack *stack, const struct render_footprint *footprint,
+                                 double x_mm, double cell_mm, double u, double v)
+{
+    const double reach_mm = 14;
+    double sum = 0;
+    for (double from_mm = (u - 1) * cell_mm; from_mm < x_mm + reach_mm; from_mm += cell_mm) {
+        const double lit_mm = fmax(from_mm, 0), width_mm = from_mm + cell_mm - lit_mm;
+        for (double y_mm = (v - ceil(reach_mm / cell_mm)) * cell_mm; y_mm < reach_mm; y_mm += cell_mm)
+            sum += width_mm * cell_mm *
+                   spread_per_mm2(stack, footprint, hypot(lit_mm + 0.5 * width_mm - x_mm, y_mm));
+    }
+    return sum;
+}
+
+/* Largest error about the edge, mean of edges and cells that lie in any way, as part of the total. */
+static double edge_error(const dipole_stack *stack, const struct render_footprint *footprint,
+                         double cell_mm)
+{
+    enum { PHASES = 4, PLACES = 7 };
+    double largest = 0;
+    for (int place = 0; place < PLACES; place++) {
+        const double x_mm = 0.5 * (place - PLACES / 2);
+        double mean = 0;
+        for (int i = 0; i < PHASES * PHASES; i++)
+            mean += radiosity_by_cells(stack, footprint, x_mm, cell_mm, (i % PHASES + 0.5) / PHASES,
+                                       (0.5 + i / PHASES) / PHASES) /
+                    (PHASES * PHASES);
+        largest = fmax(largest, fabs(mean - radiosity_by_cells(stack, NULL, x_mm, 0.05, 0.5, 0.5)));
+    }
+    return largest / dipole_stack_total(stack, DIPOLE_FACE_LIT);
+}
+
+/* Oracle: the integral, by cells 0.05 mm wide. What is put together errs by the second power of the cells'
+ * width; what is spread again by less, though the profile's core is narrower than the cells. T79. */
+static void what_is_put_together_is_spread_again(void **state)
+{
+    (void)state;
+    const dipole_layer layer = { { .sigma_a_per_mm = 0.2, .sigma_s_prime_per_mm = 1, .eta = 1.3 },
+                                 INFINITY };
+    static const double cells_mm[] = { 0.8, 0.4 }; /* 1 and 1/2 of a mean free path */
+    dipole_stack *stack;
+    assert_true(dipole_stack_create(&layer, 1, DIPOLE_MODEL_DIPOLE, DIPOLE_FROM_ABOVE, &stack, NULL));
+    double errors[2], spread_errors[2];
+    for (int i = 0; i < 2; i++) {
+        const struct render_footprint_kernel kernel = { .spread_mm = cells_mm[i] / sqrt(12) };
+        struct render_footprint *footprint;
+        assert_true(render_footprint_create(stack, &kernel, &footprint, NULL));
+        errors[i] = edge_error(stack, NULL, cells_mm[i]);
+        spread_errors[i] = edge_error(stack, footprint, cells_mm[i]);
+        free(footprint);
+    }
+    print_message("put together %.2g, %.2g; spread again %.2g, %.2g\n", errors[0], errors[1],
+                  spread_errors[0], spread_errors[1]);
+    assert_in_range((size_t)(100 * errors[0] / errors[1]), 300, 500);
+    assert_true(spread_errors[0] < 0.6 * errors[0] && spread_errors[1] < 0.45 * errors[1]);
+    dipole_stack_destroy(stack);
 }
 
 /* Oracle: areas by flux. On a flat face that is lit as far as light spreads, counting gives the same. */
@@ -320,6 +393,7 @@ int main(void)
         cmocka_unit_test(energy_is_conserved_in_every_model),
         cmocka_unit_test(a_blurred_shadow_is_as_exact_as_asked),
         cmocka_unit_test(a_blurred_profile_keeps_its_energy),
+        cmocka_unit_test(what_is_put_together_is_spread_again),
         cmocka_unit_test(touching_balls_do_not_leak),
         cmocka_unit_test(objects_beside_each_other_look_as_alone),
         cmocka_unit_test(objects_are_told_apart_where_it_matters),

@@ -3,7 +3,7 @@
 uniform sampler2D position_mm;
 uniform sampler2D levels;        // level l from row first_rows[l] on
 uniform samplerBuffer sources;   // three texels each: position, flux, spread
-uniform samplerBuffer kernels;   // inverse and reach squared; lost; eight pieces of three cubics
+uniform samplerBuffer kernels;   // inverse, reach squared, averaged; lost; eight pieces of three cubics
 uniform usamplerBuffer words;
 uniform int first_rows[6];
 uniform int first_row;           // of the level that is drawn
@@ -31,22 +31,22 @@ vec3 interpolated(ivec2 pixel, uint mask, int level)
 }
 
 // One source: flux times the band, to the second order of its spread (render_gather_kernel_at).
-vec3 source_w_per_mm2(int source, vec3 here_mm, int kernel, vec2 inverse_and_reach2, vec3 lost)
+vec3 source_w_per_mm2(int source, vec3 here_mm, int kernel, vec3 inverse_reach2_averaged, vec3 lost)
 {
     vec4 a = texelFetch(sources, source);
     vec3 step_mm = here_mm - a.xyz;
     float distance2 = dot(step_mm, step_mm);
-    if (!(distance2 <= inverse_and_reach2.y))
+    if (!(distance2 <= inverse_reach2_averaged.y))
         return vec3(0.0);
     vec4 b = texelFetch(sources, source + 1), c = texelFetch(sources, source + 2);
-    float u = 1.0 + distance2 * inverse_and_reach2.x;
+    float u = 1.0 + distance2 * inverse_reach2_averaged.x;
     int bits = floatBitsToInt(u);
     int piece = kernel + 2 + 3 * (bits >> 22 & 7);
     float t = intBitsToFloat((bits & 0x3fffff) | 0x3f800000) - 1.25;
-    float slope = inverse_and_reach2.x * intBitsToFloat(0x7f000000 - (bits & 0x7f800000));
+    float slope = inverse_reach2_averaged.x * intBitsToFloat(0x7f000000 - (bits & 0x7f800000));
     vec3 squares = vec3(b.zw, c.x), mixed = c.yzw;  // xx yy zz, yz zx xy
     float along = dot(squares, step_mm * step_mm) + 2.0 * dot(mixed, step_mm.yzx * step_mm.zxy);
-    float trace = squares.x + squares.y + squares.z;
+    float trace = squares.x + squares.y + squares.z + inverse_reach2_averaged.z;
     float first = slope * trace, second = 4.0 * slope * slope * along;
     vec4 red = texelFetch(kernels, piece), green = texelFetch(kernels, piece + 1), blue = texelFetch(kernels, piece + 2);
     vec3 t0 = vec3(red.x, green.x, blue.x), t1 = vec3(red.y, green.y, blue.y);
@@ -77,14 +77,14 @@ void main()
     int at = place_of_tile.z + 64;
     for (int band = 0; band < band_count; band++) {
         int kernel = 26 * (bands_of_tile.x + band);
-        vec2 inverse_and_reach2 = texelFetch(kernels, kernel).xy;
+        vec3 inverse_reach2_averaged = texelFetch(kernels, kernel).xyz;
         vec3 lost = texelFetch(kernels, kernel + 1).rgb;
         int end = at + 1 + int(texelFetch(words, at).r);
         for (at++; at < end; at++) {
             uint word = texelFetch(words, at).r;
             int group = 24 * int(word >> 8);
             for (uint near = word & 255u; near != 0u; near &= near - 1u)
-                sum += source_w_per_mm2(group + 3 * findLSB(near), here_mm, kernel, inverse_and_reach2, lost);
+                sum += source_w_per_mm2(group + 3 * findLSB(near), here_mm, kernel, inverse_reach2_averaged, lost);
         }
     }
     radiosity_w_per_mm2 = vec4(sum, 0.0);
