@@ -22,8 +22,12 @@
 #define RENDER_COST_TRIANGLE_4 170.0   /* the same, where pixels have four points      */
 #define RENDER_COST_EMPTY_PIXEL 12.0   /* cleared and looked at                        */
 #define RENDER_COST_SURFACE_PIXEL 80.0 /* covered: four points found, one resolved     */
-#define RENDER_COST_VIEW_TEXEL 17.0    /* of a light's view, cleared and drawn         */
-#define RENDER_COST_READ_TEXEL 25.0    /* of the view, read back and put into samples  */
+#define RENDER_COST_VIEW_TEXEL 0.5     /* of a light's view, cleared                   */
+#define RENDER_COST_LIT_TEXEL 17.0     /* the same, drawn                              */
+#define RENDER_COST_REST_TEXEL 9.0     /* and where it is at rest                      */
+#define RENDER_COST_READ_TEXEL 8.5     /* of the view, read back and put into samples  */
+#define RENDER_COST_TOLD_TEXEL 7.0     /* and told apart by its object                 */
+#define RENDER_COST_CELL_TEXEL 35.0    /* and looked up among cubes at rest            */
 #define RENDER_COST_PICTURE_TEXEL 12.0 /* of one drawn in memory, and the same    */
 #define RENDER_COST_PICTURE_TRIANGLE 30.0
 #define RENDER_COST_SHADOW_PIXEL 100.0    /* covered, lit and shaded at one point         */
@@ -86,6 +90,27 @@ static inline double render_cost_view_texels(const struct render_plan *plan)
     double count = 0;
     for (size_t i = 0; i < plan->view_count; i++)
         count += (double)plan->views[i].size_px * plan->views[i].size_px;
+    return count;
+}
+
+/* Those of them that show an object, about: a quarter of a convex surface is what light sees of it. */
+static inline double render_cost_lit_texels(const struct render_plan *plan)
+{
+    double count = 0;
+    for (size_t v = 0; v < plan->view_count; v++) {
+        const struct render_plan_view *const view = &plan->views[v];
+        const double most = (double)view->size_px * view->size_px;
+        double of_view = 0;
+        for (size_t i = 0; i < plan->media->object_count; i++) {
+            double in_view_mm[3], texel_mm2 = view->texel_area;
+            render_projection_to_view(&view->projection, plan->objects[i].ball.centre_mm, in_view_mm);
+            if (!view->projection.is_orthographic)
+                texel_mm2 *= in_view_mm[2] * in_view_mm[2];
+            if (in_view_mm[2] > 0)
+                of_view += 0.25 * plan->media->area_mm2[i] / texel_mm2;
+        }
+        count += fmin(of_view, most);
+    }
     return count;
 }
 

@@ -215,8 +215,10 @@ static void look_at_objects(const struct render_request *request, struct render_
         medium->diameter_mm = fmax(medium->diameter_mm, 2 * object->ball.radius_mm);
         plan->has_scattering |= plan->media->media[object->medium].has_scattering;
         plan->has_specular |= scene->objects[i].has_specular;
+        plan->glossy_px += scene->objects[i].has_specular ? object->pixel_count : 0;
     }
     plan->covered_px = fmin(plan->covered_px, (double)plan->width_px * plan->height_px);
+    plan->glossy_px = fmin(plan->glossy_px, plan->covered_px);
 }
 
 static bool read_scene(const struct render_request *request, struct render_plan *plan,

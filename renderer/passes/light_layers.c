@@ -24,7 +24,7 @@ static struct render_decision decide(const struct render_request *request, const
 static double cost_ms(const struct render_plan *plan)
 {
     const double side_px = plan->views[0].size_px;
-    return render_cost_ms(1, 0.02 * RENDER_COST_VIEW_TEXEL * side_px * side_px * (double)plan->view_count);
+    return render_cost_ms(RENDER_COST_VIEW_TEXEL, side_px * side_px * (double)plan->view_count);
 }
 
 /* The view before is of the same light and object. */

@@ -37,7 +37,9 @@ static double cost_ms(const struct render_plan *plan)
         return render_cost_ms(RENDER_COST_PICTURE_TEXEL, render_cost_view_texels(plan)) +
                (double)plan->view_count *
                    render_cost_ms(RENDER_COST_PICTURE_TRIANGLE, (double)plan->triangle_count);
-    return render_cost_ms(RENDER_COST_READ_TEXEL, render_cost_view_texels(plan));
+    const double ns_each = RENDER_COST_READ_TEXEL + (plan->has_object_ids ? RENDER_COST_TOLD_TEXEL : 0) +
+                           (plan->coherence == RENDER_COHERENCE_SURFACE ? RENDER_COST_CELL_TEXEL : 0);
+    return render_cost_ms(ns_each, render_cost_view_texels(plan));
 }
 
 static double error(const struct render_plan *plan)

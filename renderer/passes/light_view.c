@@ -26,7 +26,10 @@ static struct render_decision decide(const struct render_request *request, const
 static double cost_ms(const struct render_plan *plan)
 {
     return (double)plan->view_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
-           render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_view_texels(plan));
+           render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_view_texels(plan)) +
+           render_cost_ms(RENDER_COST_LIT_TEXEL +
+                              (render_plan_wants(plan, "light_rest") ? RENDER_COST_REST_TEXEL : 0),
+                          render_cost_lit_texels(plan));
 }
 
 static void bind(const struct render_frame *frame)

@@ -18,7 +18,7 @@ static struct render_decision decide(const struct render_request *request, const
 static double cost_ms(const struct render_plan *plan)
 {
     return (double)plan->view_count * (render_cost_ms(RENDER_COST_SCREEN_PIXEL, render_cost_pixels(plan)) +
-                                       render_cost_ms(RENDER_COST_GLOSS_PIXEL, plan->covered_px));
+                                       render_cost_ms(RENDER_COST_GLOSS_PIXEL, plan->glossy_px));
 }
 
 static void bind(const struct render_frame *frame)

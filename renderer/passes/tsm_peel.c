@@ -22,7 +22,7 @@ static double cost_ms(const struct render_plan *plan)
 {
     return plan->tsm.layer_count *
            ((double)plan->map_count * render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->triangle_count) +
-            render_cost_ms(RENDER_COST_VIEW_TEXEL, render_cost_map_texels(plan)));
+            render_cost_ms(RENDER_COST_LIT_TEXEL, render_cost_map_texels(plan)));
 }
 
 static const struct render_pass passes[] = {

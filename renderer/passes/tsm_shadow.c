@@ -29,7 +29,7 @@ static double cost_map_ms(const struct render_plan *plan)
 {
     const double triangles = (double)(plan->triangle_count + plan->shadows.triangle_count);
     return (double)plan->map_count * render_cost_ms(RENDER_COST_TRIANGLE, triangles) +
-           render_cost_ms(RENDER_COST_VIEW_TEXEL, texels(plan));
+           render_cost_ms(RENDER_COST_SHADOW_TEXEL, texels(plan));
 }
 
 static const struct render_pass map_passes[] = {
@@ -64,9 +64,13 @@ static struct render_decision decide_avsm(const struct render_request *request,
 
 static double cost_avsm_ms(const struct render_plan *plan)
 {
+    double surface_count = 0;
+    for (size_t i = 0; i < plan->map_count; i++)
+        surface_count += plan->shadows.of_map[i].surface_count;
     return (double)plan->map_count *
-               render_cost_ms(RENDER_COST_TRIANGLE, (double)plan->shadows.triangle_count) +
-           render_cost_ms(2 * RENDER_COST_BLOCKER_SURFACE + RENDER_COST_VIEW_TEXEL, texels(plan));
+               render_cost_ms(RENDER_COST_BLOCKER_TRIANGLE, (double)plan->shadows.triangle_count) +
+           render_cost_ms(RENDER_COST_BLOCKER_SURFACE, surface_count) +
+           render_cost_ms(RENDER_COST_CURVE_TEXEL, texels(plan));
 }
 
 static const struct render_pass avsm_passes[] = {
