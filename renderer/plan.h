@@ -235,7 +235,7 @@ struct render_plan {
     int peel_axis_count;                          /* that layers are peeled along; 0: none            */
     size_t triangle_count;
     double covered_px; /* pixels that objects may cover, at most all       */
-    double glossy_px;    /* of these, those that glossy objects may cover */
+    double glossy_px;  /* of these, those that glossy objects may cover */
 
     /* The error budget: shares of epsilon, then what they lead to, of the worst medium. */
     double truncation_epsilon, aliasing_epsilon, banding_epsilon, table_epsilon;
