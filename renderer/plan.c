@@ -304,9 +304,11 @@ static size_t program_count(const struct render_effect *effect)
 }
 
 /* What an effect takes on this machine, of what it takes on that of cost.h. */
-static double predict_ms(const struct render_request *request, const struct render_effect *effect,
-                         double cost_ms)
+static double predict_ms(const struct render_request *request, const struct render_plan *plan,
+                         const struct render_effect *effect, double cost_ms)
 {
+    if (effect->is_kept && request->is_warm && plan->deformed_vertex_count + plan->moved_vertex_count == 0)
+        return 0;
     const struct render_effect_calibration *const here =
         render_calibration_find(request->calibration, effect->name);
     const double start_ms =
@@ -342,8 +344,8 @@ static void choose_gather(const struct render_request *request, struct render_pl
 {
     const double c_ms = render_cost_gather_ms(plan, RENDER_GATHER_C, request->has_gpu),
                  gl_ms = render_cost_gather_ms(plan, RENDER_GATHER_GL, request->has_gpu);
-    const double by_c_ms = predict_ms(request, &render_effect_gather, c_ms),
-                 by_gl_ms = predict_ms(request, &render_effect_gather_gl, gl_ms);
+    const double by_c_ms = predict_ms(request, plan, &render_effect_gather, c_ms),
+                 by_gl_ms = predict_ms(request, plan, &render_effect_gather_gl, gl_ms);
     plan->has_gpu = request->has_gpu;
     plan->gather = by_gl_ms < by_c_ms ? RENDER_GATHER_GL : RENDER_GATHER_C;
     if (plan->technique != RENDER_TECHNIQUE_GATHER)
@@ -364,7 +366,8 @@ static void decide(const struct render_request *request, struct render_plan *pla
         struct render_decision *const decision = &plan->decisions[e];
         *decision = render_effects[e]->decide(request, plan);
         if (decision->is_active && render_effects[e]->cost_ms)
-            decision->cost_ms = predict_ms(request, render_effects[e], render_effects[e]->cost_ms(plan));
+            decision->cost_ms =
+                predict_ms(request, plan, render_effects[e], render_effects[e]->cost_ms(plan));
         if (decision->is_active && render_effects[e]->error)
             decision->error = render_effects[e]->error(plan);
         plan->effect_count++;

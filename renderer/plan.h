@@ -84,6 +84,7 @@ struct render_effect {
     double (*cost_ms)(const struct render_plan *plan); /* when it is active (cost.h)  */
     double start_ms;                                   /* of the first picture, beside its programs   */
     double (*error)(const struct render_plan *plan);   /* NULL: it leaves none        */
+    bool is_kept; /* what it makes is kept while no object changes: later pictures do without it */
     const struct render_pass *passes;
     size_t pass_count;
 };

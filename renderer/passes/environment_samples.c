@@ -35,6 +35,7 @@ const struct render_effect render_effect_environment_samples = {
     .source = "patches of the triangles; spacing by the sampling theorem",
     .decide = decide,
     .cost_ms = cost_ms,
+    .is_kept = true,
     .passes = passes,
     .pass_count = COUNT(passes),
 };
