@@ -218,6 +218,10 @@ static void junk_in_a_picture_is_shown_as_such(void **state)
     struct tool_run run = { 0 };
     bool painted[PIXEL_COUNT];
     render_knot(&run);
+    /* by splats: gathering is nearer to the truth at edges than fit, which then takes some of their pixels
+     * for outliers, too */
+    run_tool(&run, "render", "knot.json", "-q", "-t", "splat", "-o", "knot.exr");
+    assert_int_equal(run.exit_code, 0);
     run_tool(&run, "fit", "knot.json", "knot.exr", "-o", "found.json", "--report", "clean");
     assert_done(&run);
     struct io_image *mask = read_mask("clean/knot.exr.mask.png");
