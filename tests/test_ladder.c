@@ -1,5 +1,5 @@
 /* accuracy/ladder.h, reference.h and simulation.h. */
-#include "check.h"
+#include "reference_cases.h"
 #include "run_tool.h"
 #include "tests/svg_check.h"
 
@@ -24,15 +24,6 @@ enum {
 };
 
 /* ---- what the tests share ----------------------------------------------------------------------- */
-
-static struct accuracy_reference *read_reference(void)
-{
-    struct accuracy_reference *reference;
-    dipole_status status;
-    if (!accuracy_reference_read(SOURCE_FOLDER "/tests/reference", &reference, &status))
-        fail_msg("%s:%d:%d: %s", status.source, status.line, status.column, status.message);
-    return reference;
-}
 
 static const struct accuracy_reference_case *find_case(const struct accuracy_reference *reference,
                                                        const char *name)

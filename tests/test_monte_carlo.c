@@ -5,10 +5,8 @@
  * since 64 batches know their error to 9 % and MCML's 6 to 10 batches theirs to 25 to 35 %. So the few
  * totals must all be within 3, and of many rings a share of at most 1 % may be beyond, none beyond 5.
  */
-#include "check.h"
 #include "path_tracer.h"
-
-#include "accuracy/reference.h"
+#include "reference_cases.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -100,15 +98,6 @@ static struct accuracy_mc_layer random_layer(struct rng *rng)
 struct profile {
     double found[2][ACCURACY_REFERENCE_RING_LIMIT], error[2][ACCURACY_REFERENCE_RING_LIMIT];
 };
-
-static struct accuracy_reference *read_reference(void)
-{
-    struct accuracy_reference *reference;
-    dipole_status status;
-    if (!accuracy_reference_read(SOURCE_FOLDER "/tests/reference", &reference, &status))
-        fail_msg("%s:%d:%d: %s", status.source, status.line, status.column, status.message);
-    return reference;
-}
 
 /* Neighbours are joined until each group's error is below 6 %: then errors are Gaussian. */
 static void score_rings(const struct accuracy_reference_case *from, int side, const struct profile *profile,
