@@ -122,7 +122,7 @@ double render_gather_finest_spacings(double error)
 
 double render_gather_cap_spacings(double error)
 {
-    return fmax(2 * sqrt(3.4e-3 / error), 1.5);
+    return 2 * fmax(sqrt(RENDER_GATHER_MERGING_ERROR_MAX / error), 1);
 }
 
 /* ---- sums --------------------------------------------------------------------------------------- */

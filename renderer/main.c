@@ -114,12 +114,13 @@ static void print_plan(const struct render_report *report)
         printf(", chosen for %g ms", report->budget_ms);
     printf("\n");
     if (report->r_max_mm > 0) {
-        printf("error predicted %.3g = truncation %.3g + aliasing %.3g + blur %.3g + banding %.3g + table "
-               "%.3g",
-               report->error_predicted, report->truncation_error, report->aliasing_error,
-               report->blur_error, report->banding_error, report->table_error);
+        printf(
+            "error predicted %.3g = truncation %.3g + table %.3g + root of the squares of aliasing %.3g, "
+            "blur %.3g, banding %.3g",
+            report->error_predicted, report->truncation_error, report->table_error, report->aliasing_error,
+            report->blur_error, report->banding_error);
         if (report->environment_error > 0)
-            printf(" + environment %.3g", report->environment_error);
+            printf(", environment %.3g", report->environment_error);
         printf("\n");
         printf("r_max %.4g mm, spacing %.4g mm, %zu samples, %zu splats in %d bands\n", report->r_max_mm,
                report->spacing_mm, report->sample_count, report->splat_count, report->band_count);

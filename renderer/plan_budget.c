@@ -6,10 +6,12 @@
 #include <math.h>
 
 /*
- * How epsilon is shared out. Little may be cut off beyond r_max, of the sum and so of the table: where an
- * object is lit from behind, light from afar is all there is. A tenth of epsilon made a back-lit bunny 5 %
- * too dark in places; another band costs little. Of splats a third is left for what has no bound of its
- * own, the texels of the lights' views and bands on curved surfaces.
+ * How epsilon is shared out. What is cut off, and tables, are biases and add up to what else there is. The
+ * rest differs from place to place, each in its own way, so squares add up (theory.md, "Budget"). Little
+ * may be cut off beyond r_max, of the sum and so of the table: where an object is lit from behind, light
+ * from afar is all there is. A tenth of epsilon made a back-lit bunny 5 % too dark in places; another band
+ * costs little. Of splats a third is left for what has no bound of its own, the texels of the lights' views
+ * and bands on curved surfaces.
  */
 #define TRUNCATION_SHARE 0.02
 #define ALIASING_SHARE 0.58
@@ -17,9 +19,9 @@
 #define TABLE_SHARE 0.02
 
 /* Gathering merges more, which is measured on curved surfaces (render_gather_cap_spacings), and
- * interpolates. An environment takes its share of the first. */
-#define GATHER_BANDING_SHARE 0.28
-#define GATHER_INTERPOLATION_SHARE 0.1
+ * interpolates. */
+#define GATHER_BANDING_SHARE 0.5
+#define GATHER_INTERPOLATION_SHARE 0.2
 
 /* Caps of so many spacings keep the bands of splats under their share of epsilon = 0.01; for a tenth of
  * that, so many more are needed. */
@@ -331,8 +333,9 @@ void render_plan_settle_spacing(const struct render_request *request, struct ren
         return;
     const double texel_mm = render_plan_widest_spacing_mm(plan);
     if (plan->technique == RENDER_TECHNIQUE_GATHER) {
-        const double share = GATHER_BANDING_SHARE - (plan->environment ? RENDER_ENVIRONMENT_SHARE : 0);
-        plan->banding_epsilon = limit_or(request->limits.banding, share * plan->epsilon);
+        plan->banding_epsilon =
+            fmin(limit_or(request->limits.banding, GATHER_BANDING_SHARE * plan->epsilon),
+                 RENDER_GATHER_MERGING_ERROR_MAX);
         plan->interpolation_epsilon =
             limit_or(request->limits.interpolation, GATHER_INTERPOLATION_SHARE * plan->epsilon);
     }
@@ -340,20 +343,26 @@ void render_plan_settle_spacing(const struct render_request *request, struct ren
         settle_medium(request, plan, m, texel_mm);
 }
 
+static double root_of_squares(double a, double b, double c, double d)
+{
+    return hypot(hypot(a, b), hypot(c, d));
+}
+
 void render_plan_predict_error(const struct render_request *request, struct render_plan *plan)
 {
     if (!render_plan_sums_samples(plan) || request->is_captured || !plan->has_scattering)
         return;
-    plan->banding_error = (plan->band_count > 1 ? plan->banding_epsilon : 0) + plan->interpolation_epsilon;
+    plan->banding_error =
+        hypot(plan->band_count > 1 ? plan->banding_epsilon : 0, plan->interpolation_epsilon);
     for (size_t m = 0; m < plan->media->count; m++) {
         const struct render_plan_medium *const planned = &plan->of_medium[m];
         plan->truncation_error = fmax(plan->truncation_error, planned->truncation_error);
         plan->aliasing_error = fmax(plan->aliasing_error, planned->aliasing_error);
         plan->blur_error = fmax(plan->blur_error, planned->blur_error);
         plan->table_error = fmax(plan->table_error, planned->table_error);
-        if (request->tables && planned->table_error + planned->truncation_error + planned->aliasing_error +
-                                       planned->blur_error + plan->banding_error >
-                                   plan->epsilon)
+        const double varying =
+            root_of_squares(planned->aliasing_error, planned->blur_error, plan->banding_error, 0);
+        if (request->tables && planned->table_error + planned->truncation_error + varying > plan->epsilon)
             render_plan_add_note(plan,
                                  "the table of material \"%.60s\" was baked with epsilon %.3g: its part of "
                                  "the error is %.2g; one baked with %.3g keeps %.3g",
@@ -361,6 +370,7 @@ void render_plan_predict_error(const struct render_request *request, struct rend
                                  planned->table_error + planned->truncation_error, plan->table_epsilon,
                                  plan->epsilon);
     }
-    plan->error_predicted = plan->truncation_error + plan->aliasing_error + plan->blur_error +
-                            plan->banding_error + plan->table_error + plan->environment_error;
+    plan->error_predicted = plan->truncation_error + plan->table_error +
+                            root_of_squares(plan->aliasing_error, plan->blur_error, plan->banding_error,
+                                            plan->environment_error);
 }

@@ -230,8 +230,10 @@ struct render_report {
     double epsilon;
     double budget_ms;       /* that epsilon was chosen for; 0: it was asked for */
     double predicted_ms;    /* of the whole picture; NAN: of the reference nothing is predicted */
-    double error_predicted; /* the sum of these six; of the reference estimated; INFINITY: not bounded */
-    double truncation_error, aliasing_error, blur_error, banding_error, table_error;
+    double error_predicted; /* of the reference estimated; INFINITY: not bounded; else what is cut off and
+                               the table's, and the root of the squares of the other four */
+    double truncation_error, table_error;
+    double aliasing_error, blur_error, banding_error;
     double environment_error;    /* of the harmonics left out */
     double r_max_mm, spacing_mm; /* 0 when not splatted */
     size_t sample_count;         /* at the finest */

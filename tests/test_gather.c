@@ -5,8 +5,9 @@
 
 /* ---- what the tests share ----------------------------------------------------------------------- */
 
-/* A picture of a wavy surface, lit in patches. */
-enum { SIDE_PX = 96 };
+/* A picture of a wavy surface, lit in patches. A sample stands for the light of PATCH_POINTS, three by
+ * three. */
+enum { SIDE_PX = 96, PATCH_SIDE = 3, PATCH_POINTS = PATCH_SIDE * PATCH_SIDE };
 struct scenery {
     struct test_profile profile;
     struct render_band bands[RENDER_BAND_LIMIT];
@@ -14,14 +15,33 @@ struct scenery {
     struct render_gather_medium medium;
     struct render_light_sample *samples;
     size_t sample_count;
-    float *position_mm; /* as request.position_mm */
+    double (*points_mm)[PATCH_POINTS][3]; /* of each sample */
+    double patch_mm;                      /* a side of it, seen from above */
+    double width_mm, step_mm;             /* of the surface; where it has a step, between patches */
+    float *position_mm;                   /* as request.position_mm */
     double pixel_mm;
     bool has_slopes;
 };
 
-static double height_mm(double x_mm, double y_mm, double width_mm)
+static double height_mm(const struct scenery *scenery, double x_mm, double y_mm)
 {
-    return 0.08 * width_mm * sin(7 * x_mm / width_mm) * cos(5 * y_mm / width_mm);
+    return 0.08 * scenery->width_mm * sin(7 * x_mm / scenery->width_mm) *
+               cos(5 * y_mm / scenery->width_mm) +
+           (x_mm > scenery->step_mm ? 0.1 * scenery->width_mm : 0);
+}
+
+/* As light samples are: where its light is in the mean, and how far it is spread. */
+static void put_together(struct scenery *scenery, size_t index)
+{
+    struct render_light_sample *const sample = &scenery->samples[index];
+    struct render_spread_sums sums = { .weight = 0 };
+    for (int p = 0; p < PATCH_POINTS; p++) {
+        const double *const at = scenery->points_mm[index][p];
+        render_spread_add(&sums, 1, at[0], at[1], at[2]);
+    }
+    for (int k = 0; k < 3; k++)
+        sample->position_mm[k] = (float)(sums.first[k] / sums.weight);
+    render_spread_of(&sums, 1, scenery->patch_mm, sample->spread_mm2);
 }
 
 /* width_mm: of the picture; a step in the middle, a tenth of it high; a border without objects. */
@@ -32,27 +52,35 @@ static void scenery_init(struct scenery *scenery, const char *name, dipole_model
     profile_init(&scenery->profile, name, model, 0.01);
     const struct test_profile *const profile = &scenery->profile;
     const double r_max_mm = fmin(profile->r_max_mm, 2 * width_mm);
+    const int side = (int)fmin(ceil(width_mm / profile->spacing_mm), 400);
+    scenery->width_mm = width_mm;
+    scenery->patch_mm = width_mm / side;
+    scenery->step_mm = scenery->patch_mm * round(0.6 * side);
+    scenery->profile.source.spread_mm = RENDER_FOOTPRINT_SPREAD * scenery->patch_mm;
     scenery->band_count =
         render_bands_make(render_gather_finest_spacings(merging_error) * profile->spacing_mm, r_max_mm,
                           render_gather_cap_spacings(merging_error), scenery->bands);
     assert_true(render_gather_medium_init(&profile->source, scenery->bands, scenery->band_count,
                                           &scenery->medium, NULL));
-    const int side = (int)fmin(ceil(width_mm / profile->spacing_mm), 400);
     scenery->samples = calloc((size_t)side * (size_t)side, sizeof *scenery->samples);
+    scenery->points_mm = calloc((size_t)side * (size_t)side, sizeof *scenery->points_mm);
     scenery->sample_count = 0;
     struct rng rng = { .seed = 5 };
     for (int i = 0; i < side * side; i++) {
-        const double x = (i % side + 0.5) * width_mm / side, y = (i / side + 0.5) * width_mm / side;
+        const double x = (i % side + 0.5) * scenery->patch_mm, y = (i / side + 0.5) * scenery->patch_mm;
         if (x > 0.3 * width_mm && x < 0.45 * width_mm)
             continue; /* a shadow */
-        struct render_light_sample *const sample = &scenery->samples[scenery->sample_count++];
-        const double area_mm2 = width_mm * width_mm / side / side;
-        sample->position_mm[0] = (float)x;
-        sample->position_mm[1] = (float)y;
-        sample->position_mm[2] =
-            (float)(height_mm(x, y, width_mm) + (x > 0.6 * width_mm ? 0.1 * width_mm : 0));
+        const size_t index = scenery->sample_count++;
+        for (int p = 0; p < PATCH_POINTS; p++) {
+            double *const at = scenery->points_mm[index][p];
+            at[0] = x + (p % PATCH_SIDE - 1) * scenery->patch_mm / PATCH_SIDE;
+            at[1] = y + (p / PATCH_SIDE - 1) * scenery->patch_mm / PATCH_SIDE;
+            at[2] = height_mm(scenery, at[0], at[1]);
+        }
+        put_together(scenery, index);
         for (int c = 0; c < 3; c++)
-            sample->flux_w[c] = (float)(area_mm2 * uniform(&rng, 0.8, 1.2));
+            scenery->samples[index].flux_w[c] =
+                (float)(scenery->patch_mm * scenery->patch_mm * uniform(&rng, 0.8, 1.2));
     }
     scenery->position_mm = calloc(SIDE_PX * SIDE_PX, 4 * sizeof *scenery->position_mm);
     scenery->pixel_mm = width_mm / SIDE_PX;
@@ -64,7 +92,7 @@ static void scenery_init(struct scenery *scenery, const char *name, dipole_model
         float *const place = scenery->position_mm + 4 * i;
         place[0] = (float)x;
         place[1] = (float)y;
-        place[2] = (float)(height_mm(x, y, width_mm) + (x > 0.6 * width_mm ? 0.1 * width_mm : 0));
+        place[2] = (float)height_mm(scenery, x, y);
         place[3] = 1;
     }
 }
@@ -73,6 +101,7 @@ static void scenery_end(struct scenery *scenery)
 {
     profile_end(&scenery->profile);
     free(scenery->samples);
+    free(scenery->points_mm);
     free(scenery->position_mm);
 }
 
@@ -83,7 +112,8 @@ static float *gathered_by(const struct scenery *scenery, const uint64_t *codes, 
     float *const radiosity = calloc(SIDE_PX * SIDE_PX, 4 * sizeof *radiosity);
     struct render_gather_sources sources;
     assert_true(render_gather_sources_init(scenery->samples, codes, 0, scenery->sample_count,
-                                           scenery->bands, scenery->band_count, 0, &sources, NULL));
+                                           scenery->bands, scenery->band_count,
+                                           scenery->profile.source.spread_mm, &sources, NULL));
     const struct render_gather_object object = { &scenery->medium, &sources, scenery->pixel_mm };
     const struct render_gather_request request = { .width_px = SIDE_PX,
                                                    .height_px = SIDE_PX,
@@ -122,21 +152,22 @@ struct error {
     double rmse, max, bias;
 };
 
-/* Of every channel, relative to the brightest: direct sums over all samples at every 41st pixel. */
+/* Of every channel, relative to the brightest: direct sums over all points of light at every 83rd pixel. */
 static struct error error_of(const struct scenery *scenery, const float *radiosity)
 {
     double bias = 0, sum = 0, square = 0, square_expected = 0, largest = 0, brightest = 0;
-    for (int i = 0; i < SIDE_PX * SIDE_PX; i += 41) {
+    for (int i = 0; i < SIDE_PX * SIDE_PX; i += 83) {
         const float *const place = scenery->position_mm + 4 * i;
         double expected[3] = { 0, 0, 0 };
-        for (size_t s = 0; s < scenery->sample_count && place[3] > 0; s++) {
-            const struct render_light_sample *const sample = &scenery->samples[s];
+        for (size_t s = 0; s < PATCH_POINTS * scenery->sample_count && place[3] > 0; s++) {
+            const struct render_light_sample *const sample = &scenery->samples[s / PATCH_POINTS];
+            const double *const at = scenery->points_mm[s / PATCH_POINTS][s % PATCH_POINTS];
             double square_mm2 = 0, rgb[3];
             for (int k = 0; k < 3; k++)
-                square_mm2 += pow((double)place[k] - (double)sample->position_mm[k], 2);
+                square_mm2 += pow((double)place[k] - at[k], 2);
             lut_splat_sample(scenery->profile.table, 0, sqrt(square_mm2), rgb);
             for (int c = 0; c < 3; c++)
-                expected[c] += (double)sample->flux_w[c] * rgb[c];
+                expected[c] += (double)sample->flux_w[c] / PATCH_POINTS * rgb[c];
         }
         for (int c = 0; c < 3; c++) {
             const double error = (double)radiosity[4 * i + c] - expected[c];
@@ -549,7 +580,7 @@ static void sums_are_right(void **state)
         const char *name;
         dipole_model model;
         double width_mm;
-    } cases[] = { { "marble", DIPOLE_MODEL_DIPOLE, 30 },    { "marble", DIPOLE_MODEL_BEAM, 60 },
+    } cases[] = { { "marble", DIPOLE_MODEL_DIPOLE, 30 },    { "marble", DIPOLE_MODEL_BEAM, 30 },
                   { "ketchup", DIPOLE_MODEL_DIPOLE, 60 },   { "skin1", DIPOLE_MODEL_DIPOLE, 10 },
                   { "wholemilk", DIPOLE_MODEL_DIPOLE, 40 }, { "skimmilk", DIPOLE_MODEL_DIPOLE, 4 },
                   { "spectralon", DIPOLE_MODEL_DIPOLE, 5 }, { "apple", DIPOLE_MODEL_BETTER_DIPOLE, 40 } };
@@ -568,26 +599,38 @@ static void sums_are_right(void **state)
             error.max, error.bias, counts.place_count, counts.refined_count, counts.evaluation_count);
         assert_true(error.rmse < 0.0038);
         assert_true(error.max < 3 * 0.0038);
-        assert_true(fabs(error.bias) < 1.1e-3); /* 48 samples, merged, have 0.99e-3 by themselves */
+        assert_true(fabs(error.bias) < 1.5e-3); /* of 48 samples, 1.2e-3 */
         free(radiosity);
         scenery_end(&scenery);
     }
 }
 
-/* Turn samples and places about a skew axis through the origin, and step aside. */
-static void turn(struct scenery *scenery, double angle_rad)
+/* About a skew axis through the origin, and a step aside. */
+static void turn_point(double angle_rad, double at_mm[3])
 {
     const double axis[3] = { 2.0 / 7, 3.0 / 7, 6.0 / 7 }, c = cos(angle_rad), s = sin(angle_rad);
-    for (size_t i = 0; i < scenery->sample_count + SIDE_PX * SIDE_PX; i++) {
-        float *const at = i < scenery->sample_count
-                              ? scenery->samples[i].position_mm
-                              : scenery->position_mm + 4 * (i - scenery->sample_count);
-        const double x[3] = { (double)at[0], (double)at[1], (double)at[2] };
-        const double along = axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2];
-        for (int k = 0; k < 3; k++) {
-            const double across = axis[(k + 1) % 3] * x[(k + 2) % 3] - axis[(k + 2) % 3] * x[(k + 1) % 3];
-            at[k] = (float)(c * x[k] + s * across + (1 - c) * along * axis[k] + 1.234);
-        }
+    const double x[3] = { at_mm[0], at_mm[1], at_mm[2] };
+    const double along = axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2];
+    for (int k = 0; k < 3; k++) {
+        const double across = axis[(k + 1) % 3] * x[(k + 2) % 3] - axis[(k + 2) % 3] * x[(k + 1) % 3];
+        at_mm[k] = c * x[k] + s * across + (1 - c) * along * axis[k] + 1.234;
+    }
+}
+
+static void turn(struct scenery *scenery, double angle_rad)
+{
+    for (size_t i = 0; i < scenery->sample_count; i++) {
+        for (int p = 0; p < PATCH_POINTS; p++)
+            turn_point(angle_rad, scenery->points_mm[i][p]);
+        put_together(scenery, i);
+    }
+    for (int i = 0; i < SIDE_PX * SIDE_PX; i++) {
+        double at_mm[3];
+        for (int k = 0; k < 3; k++)
+            at_mm[k] = (double)scenery->position_mm[4 * i + k];
+        turn_point(angle_rad, at_mm);
+        for (int k = 0; k < 3; k++)
+            scenery->position_mm[4 * i + k] = (float)at_mm[k];
     }
 }
 
@@ -605,13 +648,13 @@ static double spacing_of(const char *name)
 static void merging_errs_as_planned_at_any_angle(void **state)
 {
     (void)state;
-    static const double errors[] = { 4.5e-3, 2.8e-3, 1.4e-3, 8.4e-4 };
+    static const double errors[] = { 3.4e-3, 2.8e-3, 1.4e-3, 8.4e-4 };
     struct rng rng = { .seed = 21 };
     for (size_t m = 0; m < BUNDLED_COUNT; m++) {
         for (size_t e = 0; e < COUNT(errors); e++) {
             struct scenery scenery;
             struct render_gather_counts counts;
-            const double width_mm = spacing_of(bundled[m]) * log_uniform(&rng, 20, 100);
+            const double width_mm = spacing_of(bundled[m]) * log_uniform(&rng, 20, 60);
             scenery_init(&scenery, bundled[m], DIPOLE_MODEL_DIPOLE, width_mm, errors[e]);
             turn(&scenery, uniform(&rng, 0.2, 6)); /* cubes cut the surface at all angles */
             float *const radiosity = gathered(&scenery, 0, 0, &counts);
