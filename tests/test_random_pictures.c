@@ -8,11 +8,11 @@
 #include <time.h>
 
 #if defined(__SANITIZE_ADDRESS__)
-enum { SCENE_COUNT = 60 };
+enum { SCENE_COUNT = 40 };
 #elif defined(__SANITIZE_THREAD__)
 enum { SCENE_COUNT = 10 };
 #else
-enum { SCENE_COUNT = 250 };
+enum { SCENE_COUNT = 130 };
 #endif
 
 static const struct random_shares shares = { .slow = 0.05, .wild = 0.02 };
