@@ -45,6 +45,8 @@ const char *bench_shadows_name(const char *path)
     return name;
 }
 
+#define EPSILON 0.01
+
 bool bench_shadows_begin(const char *path, int width_px, int height_px, struct bench_shadows *bench,
                          dipole_status *status)
 {
@@ -84,7 +86,7 @@ bool bench_shadows_draw(struct bench_shadows *bench, const struct render_shadow_
                                             .media = bench->renderer->media,
                                             .technique = RENDER_TECHNIQUE_LAMBERT,
                                             .shadows = *options,
-                                            .epsilon = 0.01 };
+                                            .epsilon = EPSILON };
     struct render_executor *const executor = bench->renderer->executor;
     double least_ms = INFINITY;
     for (int i = 0; i < run_count; i++) {
@@ -104,23 +106,35 @@ bool bench_shadows_draw(struct bench_shadows *bench, const struct render_shadow_
            render_executor_read(executor, "normal", bench->normal, status);
 }
 
+bool bench_shadows_begin_rays(struct bench_shadows *bench, dipole_status *status)
+{
+    return render_casters_init(bench->scene, bench->renderer->media, EPSILON, &bench->casters, status) &&
+           render_tracer_create_with(bench->scene, &bench->casters, &bench->tracer, status);
+}
+
+void bench_shadows_end_rays(struct bench_shadows *bench)
+{
+    render_tracer_destroy(bench->tracer);
+    render_casters_end(&bench->casters);
+    bench->tracer = NULL;
+    bench->casters = (struct render_casters){ .count = 0 };
+}
+
 /* A pixel's surface is the mean of points of it, which may lie below its facets. */
 #define LIFT_MM 0.03
 
-void bench_shadows_trace(const struct bench_shadows *bench, const struct render_tracer *tracer, int pixel,
-                         int place_count, double left[3])
+void bench_shadows_trace(const struct bench_shadows *bench, int pixel, int place_count, double left[3])
 {
     struct render_surface_point point = { .object = 0 };
     for (int k = 0; k < 3; k++) {
         point.facet_normal[k] = point.normal[k] = (double)bench->normal[4 * pixel + k];
         point.position_mm[k] = (double)bench->position_mm[4 * pixel + k] + LIFT_MM * point.normal[k];
     }
-    render_light_left(tracer, &bench->scene->lights[0], &point, place_count, left);
+    render_light_left(bench->tracer, &bench->scene->lights[0], &point, place_count, left);
 }
 
 struct row_tracer {
     const struct bench_shadows *bench;
-    const struct render_tracer *tracer;
     int place_count;
 };
 
@@ -129,20 +143,18 @@ static void trace_row(void *context, int row)
     const struct row_tracer *const rows = context;
     for (int i = row * rows->bench->width_px; i < (row + 1) * rows->bench->width_px; i++) {
         if (rows->bench->position_mm[4 * i + 3] > 0)
-            bench_shadows_trace(rows->bench, rows->tracer, i, rows->place_count,
-                                rows->bench->truth + 3 * (size_t)i);
+            bench_shadows_trace(rows->bench, i, rows->place_count, rows->bench->truth + 3 * (size_t)i);
     }
 }
 
 bool bench_shadows_trace_all(struct bench_shadows *bench, int place_count, dipole_status *status)
 {
-    struct render_tracer *tracer;
-    if (!render_tracer_create(bench->scene, &tracer, status))
-        return false;
-    struct row_tracer rows = { .bench = bench, .tracer = tracer, .place_count = place_count };
-    lut_parallel_for(bench->height_px, 0, trace_row, &rows);
-    render_tracer_destroy(tracer);
-    return true;
+    struct row_tracer rows = { .bench = bench, .place_count = place_count };
+    const bool done = bench_shadows_begin_rays(bench, status);
+    if (done)
+        lut_parallel_for(bench->height_px, 0, trace_row, &rows);
+    bench_shadows_end_rays(bench);
+    return done;
 }
 
 double bench_shadows_cosine(const struct bench_shadows *bench, int pixel)

@@ -12,6 +12,8 @@ struct bench_shadows {
     int width_px, height_px;
     float *shadow, *position_mm, *normal; /* of the picture that was drawn last, four for each pixel */
     double *truth;                        /* three for each pixel */
+    struct render_casters casters;        /* what light comes through, as rays know it and as it is drawn */
+    struct render_tracer *tracer;
 };
 
 /* Fails as a scene's reading and the renderer do. End it in every case. */
@@ -27,9 +29,12 @@ DIPOLE_CHECKED bool bench_shadows_draw(struct bench_shadows *bench,
                                        const struct render_shadow_options *options, int run_count,
                                        double *ms_out, dipole_status *status);
 
+/* Rays through the scene as it is now; end them in every case. */
+DIPOLE_CHECKED bool bench_shadows_begin_rays(struct bench_shadows *bench, dipole_status *status);
+void bench_shadows_end_rays(struct bench_shadows *bench);
+
 /* What place_count points of the first light leave at a pixel of the picture that was drawn last. */
-void bench_shadows_trace(const struct bench_shadows *bench, const struct render_tracer *tracer, int pixel,
-                         int place_count, double left[3]);
+void bench_shadows_trace(const struct bench_shadows *bench, int pixel, int place_count, double left[3]);
 /* The same of all pixels, into truth. */
 DIPOLE_CHECKED bool bench_shadows_trace_all(struct bench_shadows *bench, int place_count,
                                             dipole_status *status);

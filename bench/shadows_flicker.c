@@ -23,7 +23,6 @@ struct flicker_bench {
     int point_count;
     int pixel[POINTS]; /* of this frame; -1: none shows the point */
     double *expected_now;
-    const struct render_tracer *tracer;
     double error[FRAMES][POINTS], expected[FRAMES][POINTS]; /* NAN: not seen */
 };
 
@@ -38,7 +37,7 @@ static void choose_points(struct flicker_bench *bench)
         double left[3];
         if (!(bench_shadows_cosine(shadows, pixel) > 0))
             continue;
-        bench_shadows_trace(shadows, bench->tracer, pixel, 64, left);
+        bench_shadows_trace(shadows, pixel, 64, left);
         if (left[0] < 0.02 || left[0] > 0.98) /* in penumbras alone */
             continue;
         for (int k = 0; k < 3; k++)
@@ -80,7 +79,7 @@ static void trace_point(void *context, int index)
     double left[3];
     if (bench->pixel[index] < 0)
         return;
-    bench_shadows_trace(&bench->shadows, bench->tracer, bench->pixel[index], PLACES, left);
+    bench_shadows_trace(&bench->shadows, bench->pixel[index], PLACES, left);
     bench->expected_now[index] = left[0];
 }
 
@@ -88,17 +87,16 @@ static void trace_point(void *context, int index)
  */
 static bool trace_frame(struct flicker_bench *bench, int frame, dipole_status *status)
 {
-    struct render_tracer *tracer;
-    if (!render_tracer_create(bench->shadows.scene, &tracer, status))
-        return false;
-    bench->tracer = tracer;
-    if (frame == 0)
-        choose_points(bench);
-    find_pixels(bench);
-    bench->expected_now = bench->expected[frame];
-    lut_parallel_for(bench->point_count, 0, trace_point, bench);
-    render_tracer_destroy(tracer);
-    return true;
+    const bool done = bench_shadows_begin_rays(&bench->shadows, status);
+    if (done) {
+        if (frame == 0)
+            choose_points(bench);
+        find_pixels(bench);
+        bench->expected_now = bench->expected[frame];
+        lut_parallel_for(bench->point_count, 0, trace_point, bench);
+    }
+    bench_shadows_end_rays(&bench->shadows);
+    return done;
 }
 
 static bool run_frame(struct flicker_bench *bench, int frame, enum render_shadow_turn turn,
