@@ -2,6 +2,7 @@
 
 #include "accuracy/interior.h"
 #include "io/half.h"
+#include "renderer/gather.h"
 #include "renderer/plan.h"
 
 #include <stddef.h>
@@ -303,7 +304,7 @@ const struct accuracy_knob accuracy_knobs[] = {
       .set = set_limit,
       .limit = offsetof(struct render_limits, banding),
       .format = "merging %.2g",
-      .values = { 0.03, 0.01, 0.005, 0.002, 0.001, 5e-4 },
+      .values = { RENDER_GATHER_MERGING_ERROR_MAX, 0.002, 0.001, 5e-4, 2e-4, 1e-4 },
       .value_count = 6 },
     { .name = "levels",
       .title = "Levels of pixels",

@@ -11,18 +11,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char details[] = "Draws the scene, by default a bundled one, with every knob of the renderer "
-                              "turned from coarse to fine, all others "
-                              "fine, and with the automatic choice; measures each picture against the "
-                              "converged reference, and how long it "
-                              "takes. DIR/report.html shows it on one page, DIR/accuracy.json has the "
-                              "numbers. Pictures are timed in turns, so "
-                              "that noise hits all alike. What was interrupted is taken up again.\n"
-                              "\n"
-                              "  accuracy -o report\n"
-                              "  accuracy scenes/layers.json -o layers --size 400x300\n"
-                              "  accuracy --calibrate\n"
-                              "  accuracy --monte-carlo marble --photons 1e7\n";
+static const char details[] =
+    "Draws the scene, by default a bundled one, with every knob of the renderer "
+    "turned from coarse to fine, all others "
+    "fine, and with the automatic choice; measures each picture against the "
+    "converged reference, and how long it "
+    "takes. DIR/report.html shows it on one page, DIR/accuracy.json has the "
+    "numbers. The scene's coefficients are fitted to the reference, with few and many pixels and "
+    "radii. Pictures are timed in turns, so "
+    "that noise hits all alike. What was interrupted is taken up again.\n"
+    "\n"
+    "  accuracy -o report\n"
+    "  accuracy scenes/layers.json -o layers --size 400x300\n"
+    "  accuracy --calibrate\n"
+    "  accuracy --monte-carlo marble --photons 1e7\n";
 
 struct options {
     struct cli_common common;
@@ -62,7 +64,8 @@ static bool measure(const struct cli_tool *tool, const struct options *options,
         cli_note(tool, &options->common,
                  "interrupted: run it again to go on; the report has what there is");
     if (done && !stop && !options->is_quick)
-        done = accuracy_sweep_climb(&sweep, &stop, options->folder, &progress, status);
+        done = accuracy_sweep_fit(&sweep, &stop, options->folder, &progress, status) &&
+               accuracy_sweep_climb(&sweep, &stop, options->folder, &progress, status);
     done = done && accuracy_page_write(&sweep, options->folder, status);
     cli_progress_show(&bar, "done", 1);
     if (done && !options->common.json)

@@ -129,11 +129,11 @@ static void add_table(struct plot_text *page, const struct accuracy_sweep *sweep
         char low[FIT_NUMBER_SIZE], high[FIT_NUMBER_SIZE];
         if (!point->is_drawn || point->time_count == 0)
             continue;
-        fit_number_format(point->low_ms, 3, low);
-        fit_number_format(point->high_ms, 3, high);
+        fit_number_format(point->time_ms.low, 3, low);
+        fit_number_format(point->time_ms.high, 3, high);
         plot_text_print(page, "<tr><td><a href=\"#%s\">%s</a></td><td>%s</td>", point->knob->name,
                         point->knob->title, point->setting.label);
-        accuracy_page_add_cell(page, point->median_ms, 3);
+        accuracy_page_add_cell(page, point->time_ms.median, 3);
         plot_text_print(page, "<td class=\"number\">%s \u2013 %s</td>", low, high);
         accuracy_page_add_cell(page, point->predicted_ms, 3);
         accuracy_page_add_cell(page, 100 * point->error.rmse, 2);
@@ -225,7 +225,7 @@ static bool add_pictures(struct plot_text *page, const struct accuracy_sweep *sw
         char time[FIT_NUMBER_SIZE], error[FIT_NUMBER_SIZE];
         if (!list[i]->picture)
             continue;
-        fit_number_format(list[i]->median_ms, 3, time);
+        fit_number_format(list[i]->time_ms.median, 3, time);
         fit_number_format(100 * list[i]->error.rmse, 2, error);
         fit_page_add(page, "<figure>");
         done = add_thumbnail(page, list[i]->picture, scale, list[i]->setting.label, status) &&
@@ -238,6 +238,58 @@ static bool add_pictures(struct plot_text *page, const struct accuracy_sweep *sw
     }
     fit_page_add(page, "</div>\n");
     return done;
+}
+
+static void add_fit_sentence(struct plot_text *page, const struct accuracy_fits *fits, size_t knob)
+{
+    char number[FIT_NUMBER_SIZE];
+    const double factor = accuracy_fits_halving_cost(fits, knob);
+    fit_number_format(factor, 2, number);
+    plot_text_print(page, "<p>%s ", accuracy_fit_knobs[knob].what);
+    if (factor > 1)
+        plot_text_print(page, "<b>Halving its error costs %s times the time.</b></p>\n", number);
+    else
+        fit_page_add(page, "<b>More of it costs time and buys nothing here.</b></p>\n");
+}
+
+static bool add_fits(struct plot_text *page, const struct accuracy_sweep *sweep, dipole_status *status)
+{
+    const struct accuracy_fits *const fits = &sweep->fits;
+    char *svg;
+    size_t size;
+    if (fits->point_count == 0 && !fits->refusal[0])
+        return true;
+    fit_page_add(page, "<h2 id=\"fit\">A fit</h2>\n");
+    if (fits->refusal[0]) {
+        plot_text_print(page, "<p class=\"small\">Nothing is fitted to this scene: %s.</p>\n",
+                        fits->refusal);
+        return true;
+    }
+    fit_page_add(page,
+                 "<p>The scene\u2019s coefficients, found again from the picture of the reference. Full: "
+                 "the largest error of those that the picture tells; hollow: half of the widest 95 % "
+                 "interval.</p>\n");
+    for (size_t k = 0; k < ACCURACY_FIT_KNOBS; k++)
+        add_fit_sentence(page, fits, k);
+    if (!accuracy_fits_plot_create(fits, &svg, &size, status) || !accuracy_page_add_plot(page, svg, size))
+        return false;
+    fit_page_add(page, "<div class=\"wide\"><table>\n<tr><th>knob</th><th class=\"number\">value</th><th "
+                       "class=\"number\">s</th><th class=\"number\">told, of 6</th><th class=\"number\">"
+                       "inside their interval</th><th class=\"number\">error %</th><th class=\"number\">"
+                       "interval \u00b1 %</th></tr>\n");
+    for (size_t i = 0; i < fits->point_count; i++) {
+        const struct accuracy_fit_point *const point = &fits->points[i];
+        plot_text_print(page, "<tr><td>%s</td><td class=\"number\">%d</td>",
+                        accuracy_fit_knobs[point->knob].title, point->value);
+        accuracy_page_add_cell(page, point->time_s.median, 3);
+        plot_text_print(page, "<td class=\"number\">%d</td><td class=\"number\">%d</td>", point->told_count,
+                        point->inside_count);
+        accuracy_page_add_cell(page, 100 * point->error, 2);
+        accuracy_page_add_cell(page, 100 * point->half_width, 2);
+        fit_page_add(page, "</tr>\n");
+    }
+    fit_page_add(page, "</table></div>\n");
+    return true;
 }
 
 static bool add_ladder(struct plot_text *page, const struct accuracy_sweep *sweep, dipole_status *status)
@@ -297,7 +349,7 @@ static bool add_all(struct plot_text *page, const struct accuracy_sweep *sweep, 
             return false;
     }
     fit_page_add(page, "</div>\n");
-    if (!add_ladder(page, sweep, status))
+    if (!add_fits(page, sweep, status) || !add_ladder(page, sweep, status))
         return false;
     add_table(page, sweep);
     return true;

@@ -58,8 +58,8 @@ static void add_to(struct curves *curves, struct plot_series *series, double x, 
     curves->y[curves->count] = y;
     snprintf(curves->tips[curves->count], TIP_SIZE,
              "%s, %s: %.3g ms, RMSE %.3g %%, Weber %.3g %%, max %.3g %%", point->knob->title,
-             point->setting.label, point->median_ms, 100 * point->error.rmse, 100 * point->error.weber_99,
-             100 * point->error.max);
+             point->setting.label, point->time_ms.median, 100 * point->error.rmse,
+             100 * point->error.weber_99, 100 * point->error.max);
     curves->tip_of[curves->count] = curves->tips[curves->count];
     curves->count++;
     series->count++;
@@ -75,7 +75,7 @@ size_t accuracy_list_points(const struct accuracy_sweep *sweep, const struct acc
         if (!point->is_drawn || point->time_count == 0 || !is_asked)
             continue;
         size_t place = count++;
-        for (; place > 0 && list[place - 1]->median_ms > point->median_ms; place--)
+        for (; place > 0 && list[place - 1]->time_ms.median > point->time_ms.median; place--)
             list[place] = list[place - 1];
         list[place] = point;
     }
@@ -97,7 +97,7 @@ bool accuracy_draw_main_plot(const struct accuracy_sweep *sweep, enum accuracy_n
         front->dash = PLOT_DASHED;
         const size_t count = accuracy_list_points(sweep, NULL, list);
         for (size_t i = 0; i < count; i++)
-            add_to(curves, front, list[i]->median_ms, list[i]->error.rmse, list[i]);
+            add_to(curves, front, list[i]->time_ms.median, list[i]->error.rmse, list[i]);
     }
     for (size_t k = 0; k < accuracy_knob_count(); k++) {
         const size_t count = accuracy_list_points(sweep, &accuracy_knobs[k], list);
@@ -107,7 +107,7 @@ bool accuracy_draw_main_plot(const struct accuracy_sweep *sweep, enum accuracy_n
         series->mark = marks[k % 4];
         series->is_hollow = k / 4 % 2 == 1;
         for (size_t i = 0; i < count; i++)
-            add_to(curves, series, list[i]->median_ms, error_of(list[i], norm), list[i]);
+            add_to(curves, series, list[i]->time_ms.median, error_of(list[i], norm), list[i]);
     }
     const struct plot plot = { .title = norm == ACCURACY_RMSE ? "What accuracy costs in time"
                                                               : norm_titles[norm],
@@ -135,11 +135,11 @@ bool accuracy_draw_knob_plot(const struct accuracy_sweep *sweep, const struct ac
     line->color = PLOT_BLUE;
     line->is_thin = true;
     for (size_t i = 0; i < count; i++)
-        add_to(curves, line, list[i]->median_ms, list[i]->error.rmse, list[i]);
+        add_to(curves, line, list[i]->time_ms.median, list[i]->error.rmse, list[i]);
     struct plot_series *const measured = begin_series(curves, PLOT_POINTS, "measured");
     measured->color = PLOT_BLUE;
     for (size_t i = 0; i < count; i++)
-        add_to(curves, measured, list[i]->median_ms, list[i]->error.rmse, list[i]);
+        add_to(curves, measured, list[i]->time_ms.median, list[i]->error.rmse, list[i]);
     struct plot_series *const predicted = begin_series(curves, PLOT_POINTS, "predicted");
     predicted->color = PLOT_RED;
     predicted->is_hollow = true;

@@ -37,9 +37,8 @@ static const char *explain(const struct tally *tally)
 {
     if (tally->bounded < tally->count)
         return "no bound in some: the model or an edge of a shadow is not part of what is predicted";
-    return tally->within < tally->count ? "loose in some: parts of the error are added up as if all were "
-                                          "largest at one point of the "
-                                          "worst surface, and the RMSE is a mean"
+    return tally->within < tally->count ? "loose in some: each part is bounded for the worst "
+                                          "surface and light, and the RMSE is a mean"
                                         : "";
 }
 
@@ -95,7 +94,7 @@ static bool add_times(struct plot_text *page, const struct accuracy_sweep *sweep
     for (size_t i = 0; i < sweep->point_count; i++) {
         const struct accuracy_point *const point = &sweep->points[i];
         if (point->time_count > 0 && isfinite(point->predicted_ms))
-            errors[count++] = fabs(point->predicted_ms / point->median_ms - 1);
+            errors[count++] = fabs(point->predicted_ms / point->time_ms.median - 1);
         if (point->effect_count > effect_count)
             effect_count = point->effect_count;
     }

@@ -35,8 +35,8 @@ static json_t *point_to_json(const struct accuracy_sweep *sweep, size_t index)
         "relative_rmse_with_edges", number(point->error.rmse_all + unknown), "weber_99",
         number(point->error.weber_99 + unknown), "max", number(point->error.max + unknown),
         "error_predicted", number(point->error_predicted), "predicted_ms", number(point->predicted_ms),
-        "times_ms", times, "median_ms", point->median_ms, "low_ms", point->low_ms, "high_ms",
-        point->high_ms, "is_best", accuracy_point_is_best(sweep, index, true), "effects", effects);
+        "times_ms", times, "median_ms", point->time_ms.median, "low_ms", point->time_ms.low, "high_ms",
+        point->time_ms.high, "is_best", accuracy_point_is_best(sweep, index, true), "effects", effects);
 }
 
 bool accuracy_results_write(const struct accuracy_sweep *sweep, const char *path, dipole_status *status)
@@ -58,6 +58,8 @@ bool accuracy_results_write(const struct accuracy_sweep *sweep, const char *path
         machine->core_count, "opengl", machine->driver, "points", points, "not_called_for", omitted);
     if (root && sweep->ladder.case_count > 0)
         json_object_set_new(root, "ladder", accuracy_ladder_to_json(&sweep->ladder));
+    if (root && (sweep->fits.point_count > 0 || sweep->fits.refusal[0]))
+        json_object_set_new(root, "fits", accuracy_fits_to_json(&sweep->fits));
     char *const text = root ? io_json_format(root) : NULL;
     const bool done = text ? io_file_write(path, text, strlen(text), status)
                            : dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for the results");

@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 int accuracy_compare_numbers(const void *a, const void *b)
 {
@@ -14,6 +15,37 @@ double accuracy_median(double *values, size_t count)
 {
     qsort(values, count, sizeof *values, accuracy_compare_numbers);
     return count > 0 ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : (double)NAN;
+}
+
+struct accuracy_spread accuracy_spread_of(const double *values, size_t count)
+{
+    double sorted[ACCURACY_REPEAT_LIMIT];
+    assert(count <= ACCURACY_REPEAT_LIMIT);
+    if (count == 0)
+        return (struct accuracy_spread){ .median = 0 };
+    memcpy(sorted, values, count * sizeof *sorted);
+    const double median = accuracy_median(sorted, count);
+    return (struct accuracy_spread){ median, sorted[count / 4], sorted[count - 1 - count / 4] };
+}
+
+double accuracy_halving_of(const double *errors, const double *times, size_t count)
+{
+    double used = 0, x_sum = 0, y_sum = 0, xx_sum = 0, xy_sum = 0, least = INFINITY, most = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!(errors[i] > 0))
+            continue;
+        const double x = log(errors[i]), y = log(times[i]);
+        used++;
+        x_sum += x;
+        y_sum += y;
+        xx_sum += x * x;
+        xy_sum += x * y;
+        least = fmin(least, errors[i]);
+        most = fmax(most, errors[i]);
+    }
+    if (used < 2 || most < 1.5 * least)
+        return NAN;
+    return pow(2, -(used * xy_sum - x_sum * y_sum) / (used * xx_sum - x_sum * x_sum));
 }
 
 enum { INTERCEPTS = 32 };

@@ -18,6 +18,9 @@
 /* For each channel of a material, of the physics ladder. */
 enum { LADDER_PHOTONS = 1000000 };
 
+/* A fit takes a second. */
+enum { FIT_REPEATS = 3 };
+
 /* ---- the list of points ------------------------------------------------------------------------- */
 
 /* A program that was built anew may measure otherwise, whatever its version. */
@@ -100,15 +103,7 @@ void accuracy_sweep_end(struct accuracy_sweep *sweep)
 
 static void summarize(struct accuracy_point *point)
 {
-    double sorted[ACCURACY_REPEAT_LIMIT];
-    const size_t count = point->time_count;
-    if (count == 0)
-        return;
-    memcpy(sorted, point->times_ms, count * sizeof *sorted);
-    qsort(sorted, count, sizeof *sorted, accuracy_compare_numbers);
-    point->median_ms = 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
-    point->low_ms = sorted[count / 4];
-    point->high_ms = sorted[count - 1 - count / 4];
+    point->time_ms = accuracy_spread_of(point->times_ms, point->time_count);
 }
 
 static bool draw(struct accuracy_sweep *sweep, struct accuracy_point *point, double *time_ms,
@@ -271,6 +266,25 @@ bool accuracy_sweep_climb(struct accuracy_sweep *sweep, const volatile sig_atomi
     return done;
 }
 
+bool accuracy_sweep_fit(struct accuracy_sweep *sweep, const volatile sig_atomic_t *stop, const char *folder,
+                        const struct render_progress *progress, dipole_status *status)
+{
+    char path[4096], reference_path[4096];
+    snprintf(path, sizeof path, "%s/accuracy.json", folder);
+    snprintf(reference_path, sizeof reference_path, "%s/reference.exr", folder);
+    const struct accuracy_fits_options options = { .scene = sweep->subject->scene,
+                                                   .media = sweep->subject->media,
+                                                   .picture_path = reference_path,
+                                                   .repeat_count = sweep->repeat_count < FIT_REPEATS
+                                                                       ? sweep->repeat_count
+                                                                       : FIT_REPEATS,
+                                                   .stop = stop,
+                                                   .show = progress->show,
+                                                   .context = progress->context };
+    return accuracy_fits_measure(&options, &sweep->fits, status) &&
+           accuracy_results_write(sweep, path, status);
+}
+
 /* ---- what it shows ------------------------------------------------------------------------------ */
 
 bool accuracy_point_is_best(const struct accuracy_sweep *sweep, size_t index, bool is_of_all)
@@ -281,9 +295,9 @@ bool accuracy_point_is_best(const struct accuracy_sweep *sweep, size_t index, bo
     for (size_t i = 0; i < sweep->point_count; i++) {
         const struct accuracy_point *const other = &sweep->points[i];
         const bool is_alike =
-            other->median_ms == point->median_ms && other->error.rmse == point->error.rmse;
+            other->time_ms.median == point->time_ms.median && other->error.rmse == point->error.rmse;
         if (i != index && other->is_drawn && other->time_count > 0 &&
-            (is_of_all || other->knob == point->knob) && other->median_ms <= point->median_ms &&
+            (is_of_all || other->knob == point->knob) && other->time_ms.median <= point->time_ms.median &&
             other->error.rmse <= point->error.rmse && !(is_alike && i > index))
             return false;
     }
@@ -292,21 +306,14 @@ bool accuracy_point_is_best(const struct accuracy_sweep *sweep, size_t index, bo
 
 double accuracy_halving_cost(const struct accuracy_sweep *sweep, const struct accuracy_knob *knob)
 {
-    double count = 0, x_sum = 0, y_sum = 0, xx_sum = 0, xy_sum = 0, least = INFINITY, most = 0;
+    double errors[ACCURACY_POINT_LIMIT], times_ms[ACCURACY_POINT_LIMIT];
+    size_t count = 0;
     for (size_t i = 0; i < sweep->point_count; i++) {
         const struct accuracy_point *const point = &sweep->points[i];
-        if (point->knob != knob || !accuracy_point_is_best(sweep, i, false) || !(point->error.rmse > 0))
+        if (point->knob != knob || !accuracy_point_is_best(sweep, i, false))
             continue;
-        const double x = log(point->error.rmse), y = log(point->median_ms);
-        count++;
-        x_sum += x;
-        y_sum += y;
-        xx_sum += x * x;
-        xy_sum += x * y;
-        least = fmin(least, point->error.rmse);
-        most = fmax(most, point->error.rmse);
+        errors[count] = point->error.rmse;
+        times_ms[count++] = point->time_ms.median;
     }
-    if (count < 2 || most < 1.5 * least)
-        return NAN;
-    return pow(2, -(count * xy_sum - x_sum * y_sum) / (count * xx_sum - x_sum * x_sum));
+    return accuracy_halving_of(errors, times_ms, count);
 }

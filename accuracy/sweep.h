@@ -3,12 +3,13 @@
 #define ACCURACY_SWEEP_H
 
 #include "accuracy/error.h"
+#include "accuracy/fits.h"
 #include "accuracy/knob.h"
 #include "accuracy/ladder.h"
 
 #include <signal.h>
 
-enum { ACCURACY_REPEAT_LIMIT = 32, ACCURACY_POINT_LIMIT = 256 };
+enum { ACCURACY_POINT_LIMIT = 256 };
 
 struct accuracy_effect_time {
     bool is_active;
@@ -23,9 +24,9 @@ struct accuracy_point {
     double error_predicted, predicted_ms;   /* NAN: nothing is predicted */
     double times_ms[ACCURACY_REPEAT_LIMIT]; /* of the picture, after a first that is not counted */
     size_t time_count;
-    double median_ms, low_ms, high_ms; /* of those; quartiles */
-    char refusal[384];                 /* why the renderer does not draw it; "": it does */
-    struct io_image *picture;          /* NULL: not drawn in this run */
+    struct accuracy_spread time_ms; /* of those */
+    char refusal[384];              /* why the renderer does not draw it; "": it does */
+    struct io_image *picture;       /* NULL: not drawn in this run */
     struct accuracy_effect_time effects[RENDER_EFFECT_LIMIT]; /* of the last picture */
     size_t effect_count;
 };
@@ -47,6 +48,7 @@ struct accuracy_sweep {
     struct accuracy_omission omissions[ACCURACY_SETTING_LIMIT];
     size_t omission_count;
     struct accuracy_ladder ladder; /* of the scene's materials; without cases until it is climbed */
+    struct accuracy_fits fits;     /* to the reference; without points until they are measured    */
 };
 
 /* List the points; is_quick: few knobs, every other setting. Bakes what settings need. End with
@@ -69,17 +71,18 @@ DIPOLE_CHECKED bool accuracy_sweep_climb(struct accuracy_sweep *sweep, const vol
                                          const char *folder, const struct render_progress *progress,
                                          dipole_status *status);
 
+/* Measure what a fit to the reference costs, and write it to the results, too. */
+DIPOLE_CHECKED bool accuracy_sweep_fit(struct accuracy_sweep *sweep, const volatile sig_atomic_t *stop,
+                                       const char *folder, const struct render_progress *progress,
+                                       dipole_status *status);
+
 /* Whether every point is drawn and timed. */
 bool accuracy_sweep_is_complete(const struct accuracy_sweep *sweep);
 
 /* Whether none other of the same knob, or of all knobs, is as exact and faster, by relative RMSE. */
 bool accuracy_point_is_best(const struct accuracy_sweep *sweep, size_t index, bool is_of_all);
 
-/*
- * How many times as long it takes to halve a knob's error: 2^-p of t ~ error^p through its best points, by
- * least squares of logarithms. NAN where there are fewer than two, or their errors are within a factor
- * of 1.5.
- */
+/* accuracy_halving_of a knob's best points. */
 double accuracy_halving_cost(const struct accuracy_sweep *sweep, const struct accuracy_knob *knob);
 
 /* ---- accuracy.json (results.c) ------------------------------------------------------------------ */

@@ -16,7 +16,8 @@
  * are the fraction. No logarithm, no search. Two grids live on that axis:
  *
  *   bins   BINS per octave, where the flux of a pair is shared linearly between its two neighbours;
- *   nodes  NODES per octave, from which the profile at each bin is interpolated by STENCIL points in log y.
+ *   nodes  FIT_NODES_PER_OCTAVE or as asked, from which the profile at each bin is interpolated by STENCIL
+ * points in log y.
  *
  * Linear sharing errs by at most (1/8)(15/4)/BINS^2 = 3e-5 on r^-3, the steepest power law of the dipole,
  * and by less elsewhere; the nodes err by less than that while sigma_tr r < 10 (tests/test_operator.c).
@@ -24,7 +25,6 @@
 enum {
     BIN_BITS = 7,
     BINS_PER_OCTAVE = 1 << BIN_BITS,
-    NODES_PER_OCTAVE = 8,
     STENCIL = 6,
     OCTAVE_LIMIT = 60,
     MANTISSA_BITS = 23,
@@ -65,20 +65,20 @@ struct build {
 
 /* Lagrange weights in log y, with the profile's far field y^(-3/2) divided out: what is interpolated is
  * nearly constant where R_d is a power law, and the weights still multiply R_d itself. */
-static void stencil_init(struct stencil *stencil, double y, size_t node_count)
+static void stencil_init(struct stencil *stencil, double y, size_t per_octave, size_t node_count)
 {
-    const size_t exact = (size_t)(ilogb(y) * NODES_PER_OCTAVE) +
-                         (size_t)((y / ldexp(1.0, ilogb(y)) - 1.0) * NODES_PER_OCTAVE);
+    const size_t exact =
+        (size_t)ilogb(y) * per_octave + (size_t)((y / ldexp(1.0, ilogb(y)) - 1.0) * (double)per_octave);
     const size_t below = STENCIL / 2 - 1;
     size_t first = exact > below ? exact - below : 0;
     if (first + STENCIL > node_count)
         first = node_count - STENCIL;
     stencil->first = first;
     for (size_t k = 0; k < STENCIL; k++) {
-        const double y_k = axis_y(first + k, NODES_PER_OCTAVE);
+        const double y_k = axis_y(first + k, per_octave);
         double weight = pow(y_k / y, 1.5);
         for (size_t m = 0; m < STENCIL; m++) {
-            const double y_m = axis_y(first + m, NODES_PER_OCTAVE);
+            const double y_m = axis_y(first + m, per_octave);
             if (m != k)
                 weight *= log(y / y_m) / log(y_k / y_m);
         }
@@ -277,8 +277,13 @@ bool fit_operator_create(const struct fit_geometry *geometry, const struct fit_p
         return dipole_fail(status, DIPOLE_BAD_VALUE, NULL,
                            "positions span %g mm, expected less than %g mm at a mean free path of %g mm",
                            largest_mm, scale_mm * ldexp(1.0, OCTAVE_LIMIT / 2 - 1), geometry->finest_mm);
-    /* one part in 1e5 above the bound, for distances rounded up in float */
-    const size_t octave_count = (size_t)ilogb(largest_y * 1.00001) + 1;
+    const size_t per_octave =
+        geometry->nodes_per_octave > 0 ? (size_t)geometry->nodes_per_octave : FIT_NODES_PER_OCTAVE;
+    /* one part in 1e5 above the bound, for distances rounded up in float; as many nodes as a stencil takes
+     */
+    size_t octave_count = (size_t)ilogb(largest_y * 1.00001) + 1;
+    while (octave_count * per_octave + 1 < STENCIL)
+        octave_count++;
 
     double colour[FIT_CHANNEL_COUNT];
     const int base = brightest_channel(geometry, colour);
@@ -293,18 +298,17 @@ bool fit_operator_create(const struct fit_geometry *geometry, const struct fit_p
         .progress = progress,
     };
     build.bin_value_count = set_count * 2 * build.bin_count;
-    const bool is_allocated = operator_allocate(geometry->pixel_count, octave_count * NODES_PER_OCTAVE + 1,
-                                                set_count, &build.op) &&
-                              create_clusters(&build) &&
-                              (build.stencils = malloc(build.bin_count * sizeof *build.stencils));
+    const bool is_allocated =
+        operator_allocate(geometry->pixel_count, octave_count * per_octave + 1, set_count, &build.op) &&
+        create_clusters(&build) && (build.stencils = malloc(build.bin_count * sizeof *build.stencils));
     if (is_allocated) {
         struct fit_operator *op = build.op;
         for (int c = 0; c < FIT_CHANNEL_COUNT; c++)
             op->colour[c] = set_count == 1 ? colour[c] : 1.0;
         for (size_t k = 0; k < op->node_count; k++)
-            op->node_r_mm[k] = scale_mm * sqrt(axis_y(k, NODES_PER_OCTAVE) - 1.0);
+            op->node_r_mm[k] = scale_mm * sqrt(axis_y(k, per_octave) - 1.0);
         for (size_t j = 0; j < build.bin_count; j++)
-            stencil_init(&build.stencils[j], axis_y(j, BINS_PER_OCTAVE), op->node_count);
+            stencil_init(&build.stencils[j], axis_y(j, BINS_PER_OCTAVE), per_octave, op->node_count);
         build_rows(&build);
     }
     for (int object = 0; build.clusters && object < build.object_count; object++)

@@ -28,9 +28,11 @@ struct fit_geometry {
     size_t pixel_count;
     const struct render_light_sample *samples;
     size_t sample_count;
-    double cut_mm;    /* light farther than this was left out of the picture; INFINITY: none was   */
-    double finest_mm; /* mean free paths down to this are represented, > 0                          */
+    double cut_mm;        /* light farther than this was left out of the picture; INFINITY: none was   */
+    double finest_mm;     /* mean free paths down to this are represented, > 0                          */
+    int nodes_per_octave; /* of r^2 + s^2: a power of 2 up to 32; 0: FIT_NODES_PER_OCTAVE            */
 };
+enum { FIT_NODES_PER_OCTAVE = 8 };
 
 /* Called now and then from the calling thread with 0 to 1. show may be NULL. */
 struct fit_progress {
@@ -40,7 +42,8 @@ struct fit_progress {
 
 /*
  * Make H for the given geometry. Interpolation changes no pixel lit at all brightly (above 1e-4 of the
- * brightest) by more than 1e-4 of itself, for media whose mean free path is at least finest_mm. The
+ * brightest) by more than 1e-4 of itself, for media whose mean free path is at least finest_mm, by
+ * FIT_NODES_PER_OCTAVE or more. The
  * same input gives the same H on any number of threads.
  * The caller ends it with fit_operator_destroy. Fails with DIPOLE_OUT_OF_MEMORY or DIPOLE_BAD_VALUE
  * (distances span more than the axis can); *operator_out is then NULL.

@@ -211,6 +211,7 @@ static bool build_operator(struct fit_picture *picture, const struct fit_progres
         .sample_count = picture->capture->samples.count,
         .cut_mm = picture->request.photo->cut_mm,
         .finest_mm = 1.5 * blur_mm, /* what is blurred has no detail below */
+        .nodes_per_octave = picture->request.nodes_per_octave,
     };
     return fit_operator_create(&geometry, progress, &picture->op, status) && build_blurs(picture, status);
 }

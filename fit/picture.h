@@ -13,7 +13,8 @@ struct fit_picture_request {
     const char *photo_path;      /* for messages                                                       */
     const struct io_image *mask; /* NULL: none                                                         */
     bool is_gain_free, is_ambient_free, is_black_free;
-    size_t pixel_limit; /* 0: FIT_PIXEL_LIMIT                                                 */
+    size_t pixel_limit;   /* 0: FIT_PIXEL_LIMIT                                                 */
+    int nodes_per_octave; /* that the profile is known at, fit/operator.h; 0: FIT_NODES_PER_OCTAVE */
 };
 #define FIT_PIXEL_LIMIT ((size_t)12000)
 

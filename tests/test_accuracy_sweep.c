@@ -44,16 +44,16 @@ static void the_best_points_are_those_that_none_beats(void **state)
     for (int round = 0; round < 50; round++) {
         sweep_init(&test, 40);
         for (size_t i = 0; i < 40; i++) {
-            test.points[i].median_ms = floor(uniform(&rng, 1, 10));
+            test.points[i].time_ms.median = floor(uniform(&rng, 1, 10));
             test.points[i].error.rmse = floor(uniform(&rng, 1, 10));
         }
         for (size_t i = 0; i < 40; i++) {
             bool is_beaten = false, has_twin = false;
             for (size_t k = 0; k < 40; k++) {
                 const struct accuracy_point *const a = &test.points[i], *const b = &test.points[k];
-                const bool is_less = b->median_ms < a->median_ms || b->error.rmse < a->error.rmse;
-                is_beaten |= b->median_ms <= a->median_ms && b->error.rmse <= a->error.rmse && is_less;
-                has_twin |= k < i && b->median_ms == a->median_ms && b->error.rmse == a->error.rmse;
+                const bool is_less = b->time_ms.median < a->time_ms.median || b->error.rmse < a->error.rmse;
+                is_beaten |= b->time_ms.median <= a->time_ms.median && b->error.rmse <= a->error.rmse && is_less;
+                has_twin |= k < i && b->time_ms.median == a->time_ms.median && b->error.rmse == a->error.rmse;
             }
             assert_int_equal(accuracy_point_is_best(&test.sweep, i, true), !is_beaten && !has_twin);
         }
@@ -71,9 +71,9 @@ static void halving_follows_a_power_law(void **state)
         for (size_t i = 0; i < 12; i++) {
             test.points[i].knob = &accuracy_knobs[2];
             test.points[i].error.rmse = pow(0.6, (double)i);
-            test.points[i].median_ms = 3 * pow(test.points[i].error.rmse, -powers[k]);
+            test.points[i].time_ms.median = 3 * pow(test.points[i].error.rmse, -powers[k]);
         }
-        test.points[5].median_ms *= 10; /* beaten: does not count */
+        test.points[5].time_ms.median *= 10; /* beaten: does not count */
         assert_close(accuracy_halving_cost(&test.sweep, &accuracy_knobs[2]), pow(2, powers[k]), 1e-9,
                      "p %g", powers[k]);
         assert_true(isnan(accuracy_halving_cost(&test.sweep, &accuracy_knobs[1])));

@@ -98,6 +98,31 @@ static void operator_agrees_with_the_direct_sum(void **state)
     assert_true(found.sum <= 1e-4);
 }
 
+/* Oracle: the direct sum. Twice as many nodes bring interpolation by six points nearer by 2^6 in the limit,
+ * by 4 at least from so few on, down to what bins err by. */
+static void more_nodes_are_nearer(void **state)
+{
+    (void)state;
+    const dipole_medium medium = { .sigma_a_per_mm = 0.01, .sigma_s_prime_per_mm = 1.0, .eta = 1.3 };
+    dipole_coefficients coefficients;
+    struct fit_scene scene;
+    double before = INFINITY;
+    assert_true(dipole_coefficients_init(&medium, &coefficients, NULL));
+    fit_scene_sphere(&scene, 10.0, PIXELS, FEW_SAMPLES);
+    scene.geometry.finest_mm = 0.5;
+    for (int nodes = 1; nodes <= 16; nodes *= 2) {
+        struct fit_operator *op;
+        scene.geometry.nodes_per_octave = nodes;
+        assert_true(fit_operator_create(&scene.geometry, NULL, &op, NULL));
+        const double worst = worst_error(&scene, op, &coefficients, 0);
+        print_message("  %d nodes an octave, %zu in all: %.2g\n", nodes, op->node_count, worst);
+        assert_true(worst <= fmax(before / 4, interpolation_error));
+        before = worst;
+        fit_operator_destroy(op);
+    }
+    fit_scene_free(&scene);
+}
+
 /* Oracle: the direct sum that leaves out pairs farther apart than the cut. A pair within float rounding of
  * the cut may fall on either side: one pair's share at the cut, 1e-4 of the sum, is the tolerance. */
 static void light_beyond_the_cut_is_left_out(void **state)
@@ -225,6 +250,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(interpolation_agrees_with_the_direct_sum),
         cmocka_unit_test(operator_agrees_with_the_direct_sum),
+        cmocka_unit_test(more_nodes_are_nearer),
         cmocka_unit_test(light_beyond_the_cut_is_left_out),
         cmocka_unit_test(light_of_many_colours_takes_a_set_each),
         cmocka_unit_test(light_stays_in_its_object),
