@@ -26,12 +26,11 @@ static const double start_factors[] = { 2, 0.6 };
 static const char *why_not(const struct accuracy_fits_options *options)
 {
     const struct io_scene *const scene = options->scene;
-    return options->media->count != 1                                   ? "it has more than one material"
-           : !options->media->has_scattering                            ? "nothing of it scatters"
-           : scene->has_environment                                     ? "it has light from all around"
-           : scene->light_count == 0                                    ? "it has no light"
-           : scene->objects[0].material.model == DIPOLE_MODEL_MULTIPOLE ? "its model is for layers alone"
-                                                                        : NULL;
+    return options->media->count != 1        ? "it has more than one material"
+           : !options->media->has_scattering ? "nothing of it scatters"
+           : scene->has_environment          ? "it has light from all around"
+           : scene->light_count == 0         ? "it has no light"
+                                             : NULL;
 }
 
 static struct fit_form start_of(const struct io_material *material)

@@ -243,13 +243,23 @@ static bool add_pictures(struct plot_text *page, const struct accuracy_sweep *sw
 static void add_fit_sentence(struct plot_text *page, const struct accuracy_fits *fits, size_t knob)
 {
     char number[FIT_NUMBER_SIZE];
+    double first = NAN, last = NAN;
     const double factor = accuracy_fits_halving_cost(fits, knob);
+    for (size_t i = 0; i < fits->point_count; i++) {
+        if (fits->points[i].knob != knob)
+            continue;
+        first = isnan(first) ? fits->points[i].half_width : first;
+        last = fits->points[i].half_width;
+    }
     fit_number_format(factor, 2, number);
     plot_text_print(page, "<p>%s ", accuracy_fit_knobs[knob].what);
     if (factor > 1)
-        plot_text_print(page, "<b>Halving its error costs %s times the time.</b></p>\n", number);
+        plot_text_print(page, "<b>Halving its error costs %s times the time</b>", number);
     else
-        fit_page_add(page, "<b>More of it costs time and buys nothing here.</b></p>\n");
+        fit_page_add(page, "<b>Errors hardly follow it here</b>");
+    plot_text_print(page,
+                    "; from the first to the last the interval goes from \u00b1 %f to \u00b1 %f %%.</p>\n",
+                    100 * first, 100 * last);
 }
 
 static bool add_fits(struct plot_text *page, const struct accuracy_sweep *sweep, dipole_status *status)
