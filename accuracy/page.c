@@ -240,6 +240,12 @@ static bool add_pictures(struct plot_text *page, const struct accuracy_sweep *sw
     return done;
 }
 
+/* Measured, or told why not. */
+static bool has_fits(const struct accuracy_fits *fits)
+{
+    return fits->point_count > 0 || fits->refusal[0];
+}
+
 static void add_fit_sentence(struct plot_text *page, const struct accuracy_fits *fits, size_t knob)
 {
     char number[FIT_NUMBER_SIZE];
@@ -267,7 +273,7 @@ static bool add_fits(struct plot_text *page, const struct accuracy_sweep *sweep,
     const struct accuracy_fits *const fits = &sweep->fits;
     char *svg;
     size_t size;
-    if (fits->point_count == 0 && !fits->refusal[0])
+    if (!has_fits(fits))
         return true;
     fit_page_add(page, "<h2 id=\"fit\">A fit</h2>\n");
     if (fits->refusal[0]) {
@@ -331,8 +337,10 @@ static bool add_all(struct plot_text *page, const struct accuracy_sweep *sweep, 
     fit_number_format(100 * sweep->reference_error, 2, error);
     plot_text_print(page, "<h1>What accuracy costs: %s</h1>\n", name_of(sweep->subject->scene->path));
     fit_page_add(page, "<nav><a href=\"#knobs\">Knob by knob</a><a href=\"#predictions\">Predictions</a><a "
-                       "href=\"#pictures\">Pictures</a><a href=\"#plan\">What is not run</a><a "
-                       "href=\"#table\">All points</a></nav>\n");
+                       "href=\"#pictures\">Pictures</a><a href=\"#plan\">What is not run</a>");
+    if (has_fits(&sweep->fits))
+        fit_page_add(page, "<a href=\"#fit\">A fit</a>");
+    fit_page_add(page, "<a href=\"#table\">All points</a></nav>\n");
     plot_text_print(
         page,
         "<p class=\"small\">%d \u00d7 %d pixels; %s, %d cores; %s. Times: medians of %d pictures each, "
