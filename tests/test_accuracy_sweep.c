@@ -52,8 +52,10 @@ static void the_best_points_are_those_that_none_beats(void **state)
             for (size_t k = 0; k < 40; k++) {
                 const struct accuracy_point *const a = &test.points[i], *const b = &test.points[k];
                 const bool is_less = b->time_ms.median < a->time_ms.median || b->error.rmse < a->error.rmse;
-                is_beaten |= b->time_ms.median <= a->time_ms.median && b->error.rmse <= a->error.rmse && is_less;
-                has_twin |= k < i && b->time_ms.median == a->time_ms.median && b->error.rmse == a->error.rmse;
+                is_beaten |=
+                    b->time_ms.median <= a->time_ms.median && b->error.rmse <= a->error.rmse && is_less;
+                has_twin |=
+                    k < i && b->time_ms.median == a->time_ms.median && b->error.rmse == a->error.rmse;
             }
             assert_int_equal(accuracy_point_is_best(&test.sweep, i, true), !is_beaten && !has_twin);
         }
