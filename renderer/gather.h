@@ -16,7 +16,7 @@ enum { RENDER_GATHER_LEVELS = 6 };
  * of its own spacings wide, that merging errs by error, relative RMSE: measured over all measured
  * materials, on wavy surfaces at any angle, at edges of light and steps (theory.md T43).
  */
-#define RENDER_GATHER_MERGING_ERROR_MAX 3.4e-3 /* narrower caps are summed no faster */
+#define RENDER_GATHER_MERGING_ERROR_MAX 3.4e-3 /* narrower caps save little time */
 double render_gather_finest_spacings(double error);
 double render_gather_cap_spacings(double error);
 

@@ -62,7 +62,8 @@ static void coefficients_come_back_from_the_reference(void **state)
             continue;
         assert_int_equal(point->told_count, 6);
         assert_int_equal(point->inside_count, 6);
-        assert_true(point->error < 0.04);
+        assert_true(point->error <= point->half_width);
+        assert_true(point->half_width < 0.1);
     }
     const size_t last = accuracy_fit_knobs[0].value_count - 1;
     assert_true(fits.points[0].half_width > fits.points[last].half_width);
