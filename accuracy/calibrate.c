@@ -31,7 +31,7 @@ enum { SIZE_COUNT = sizeof sizes_px / sizeof *sizes_px };
 
 static const struct render_options drawings[] = {
     { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.1, .gather = RENDER_GATHER_C },
-    { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.01, .gather = RENDER_GATHER_C },
+    { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.003, .gather = RENDER_GATHER_C },
     { .technique = RENDER_TECHNIQUE_GATHER, .epsilon = 0.05, .gather = RENDER_GATHER_GL },
     { .technique = RENDER_TECHNIQUE_SPLAT, .epsilon = 0.1 },
     { .technique = RENDER_TECHNIQUE_TSM, .epsilon = 0.15 },

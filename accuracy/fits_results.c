@@ -1,13 +1,8 @@
 #include "accuracy/fits.h"
+#include "io/json.h"
 #include "plot/plot.h"
 
-#include <math.h>
 #include <stdio.h>
-
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
 
 json_t *accuracy_fits_to_json(const struct accuracy_fits *fits)
 {
@@ -17,12 +12,12 @@ json_t *accuracy_fits_to_json(const struct accuracy_fits *fits)
         json_t *const times = json_array();
         for (size_t t = 0; t < point->time_count; t++)
             json_array_append_new(times, json_real(point->times_s[t]));
-        json_array_append_new(points,
-                              json_pack("{s:s, s:i, s:i, s:i, s:o, s:o, s:o, s:f}", "knob",
-                                        accuracy_fit_knobs[point->knob].name, "value", point->value, "told",
-                                        point->told_count, "inside", point->inside_count, "error",
-                                        number(point->error), "half_width", number(point->half_width),
-                                        "times_s", times, "median_s", point->time_s.median));
+        json_array_append_new(points, json_pack("{s:s, s:i, s:i, s:i, s:o, s:o, s:o, s:f}", "knob",
+                                                accuracy_fit_knobs[point->knob].name, "value", point->value,
+                                                "told", point->told_count, "inside", point->inside_count,
+                                                "error", io_json_number(point->error), "half_width",
+                                                io_json_number(point->half_width), "times_s", times,
+                                                "median_s", point->time_s.median));
     }
     return fits->refusal[0] ? json_pack("{s:o, s:s}", "points", points, "refusal", fits->refusal)
                             : json_pack("{s:o}", "points", points);

@@ -8,11 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 /* NULL: no memory. */
 static json_t *point_to_json(const struct accuracy_sweep *sweep, size_t index)
 {
@@ -26,17 +21,18 @@ static json_t *point_to_json(const struct accuracy_sweep *sweep, size_t index)
         const struct accuracy_effect_time *const effect = &point->effects[e];
         if (effect->is_active)
             json_array_append_new(effects, json_pack("{s:s, s:o, s:f}", "name", render_effects[e]->name,
-                                                     "predicted_ms", number(effect->predicted_ms), "ms",
-                                                     effect->measured_ms));
+                                                     "predicted_ms", io_json_number(effect->predicted_ms),
+                                                     "ms", effect->measured_ms));
     }
     return json_pack(
         "{s:s, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:o}", "knob", point->knob->name,
-        "setting", point->setting.label, "relative_rmse", number(point->error.rmse + unknown),
-        "relative_rmse_with_edges", number(point->error.rmse_all + unknown), "weber_99",
-        number(point->error.weber_99 + unknown), "max", number(point->error.max + unknown),
-        "error_predicted", number(point->error_predicted), "predicted_ms", number(point->predicted_ms),
-        "times_ms", times, "median_ms", point->time_ms.median, "low_ms", point->time_ms.low, "high_ms",
-        point->time_ms.high, "is_best", accuracy_point_is_best(sweep, index, true), "effects", effects);
+        "setting", point->setting.label, "relative_rmse", io_json_number(point->error.rmse + unknown),
+        "relative_rmse_with_edges", io_json_number(point->error.rmse_all + unknown), "weber_99",
+        io_json_number(point->error.weber_99 + unknown), "max", io_json_number(point->error.max + unknown),
+        "error_predicted", io_json_number(point->error_predicted), "predicted_ms",
+        io_json_number(point->predicted_ms), "times_ms", times, "median_ms", point->time_ms.median,
+        "low_ms", point->time_ms.low, "high_ms", point->time_ms.high, "is_best",
+        accuracy_point_is_best(sweep, index, true), "effects", effects);
 }
 
 bool accuracy_results_write(const struct accuracy_sweep *sweep, const char *path, dipole_status *status)

@@ -1,7 +1,6 @@
 #include "dipole/inspect.h"
+#include "io/json.h"
 
-#include <jansson.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -216,12 +215,6 @@ void inspector_result_print(const struct inspector_result *result)
 
 /* ---- for programs ------------------------------------------------------------------------------- */
 
-/* JSON has no infinity: a length that does not end is null. */
-static json_t *real_or_null(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 /* Append a value that may be NULL because it could not be made. */
 static bool append(json_t *array, json_t *value)
 {
@@ -255,12 +248,12 @@ static json_t *layers_to_json(const struct inspector_result *result,
         const char *const name = material->layer_names[i];
         if (!append(layers, json_pack("{s:s*, s:o, s:f, s:f, s:f, s:f, s:f, s:f, s:o, s:f}", "name",
                                       name[0] ? name : NULL, "thickness_mm",
-                                      real_or_null(material->layers[0][i].thickness_mm), "eta", c->eta,
+                                      io_json_number(material->layers[0][i].thickness_mm), "eta", c->eta,
                                       "sigma_a_per_mm", c->sigma_a_per_mm, "sigma_s_prime_per_mm",
                                       c->sigma_s_prime_per_mm, "alpha_prime", c->alpha_prime,
                                       "mean_free_path_mm", c->mean_free_path_mm, "sigma_tr_per_mm",
                                       c->sigma_tr_per_mm, "diffuse_mean_free_path_mm",
-                                      real_or_null(1 / c->sigma_tr_per_mm), "fdr", c->fdr))) {
+                                      io_json_number(1 / c->sigma_tr_per_mm), "fdr", c->fdr))) {
             json_decref(layers);
             return NULL;
         }
@@ -280,11 +273,11 @@ static json_t *channel_to_json(const struct inspector_result *result,
         "channel", channel->name, "sigma_a_per_mm", c->sigma_a_per_mm, "sigma_s_prime_per_mm",
         c->sigma_s_prime_per_mm, "alpha_prime", c->alpha_prime, "mean_free_path_mm", c->mean_free_path_mm,
         "sigma_tr_per_mm", c->sigma_tr_per_mm, "diffuse_mean_free_path_mm",
-        real_or_null(channel->diffuse_mean_free_path_mm), "fdr", c->fdr, "z_r_mm", c->z_r_mm, "z_v_mm",
+        io_json_number(channel->diffuse_mean_free_path_mm), "fdr", c->fdr, "z_r_mm", c->z_r_mm, "z_v_mm",
         c->z_v_mm, "diffuse_reflectance", channel->diffuse_reflectance, "diffuse_transmittance",
         channel->diffuse_transmittance, "unscattered_transmittance", channel->unscattered_transmittance,
         "unscattered_reflectance", channel->unscattered_reflectance, "r_max_mm",
-        real_or_null(channel->r_max_mm), "splat_spacing_mm", real_or_null(channel->splat_spacing_mm),
+        io_json_number(channel->r_max_mm), "splat_spacing_mm", io_json_number(channel->splat_spacing_mm),
         "layers", layers, "profile", profile_to_json(result, channel));
 }
 

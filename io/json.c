@@ -437,6 +437,11 @@ bool io_json_get_choice(const struct io_json *object, const char *key, const cha
 
 /* ---- writing ------------------------------------------------------------------------------------- */
 
+json_t *io_json_number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
 static bool is_flat(json_t *array)
 {
     for (size_t i = 0; i < json_array_size(array); i++)

@@ -81,6 +81,9 @@ DIPOLE_CHECKED bool io_json_get_text(const struct io_json *object, const char *k
 DIPOLE_CHECKED bool io_json_get_choice(const struct io_json *object, const char *key,
                                        const char *const *choices, int *out, dipole_status *status);
 
+/* null for infinities and NaN, which JSON does not have. NULL: no memory. */
+json_t *io_json_number(double value);
+
 /* JSON as text for people: one member per line, arrays of numbers on one line, each number with as few
  * digits as give it back; ends with a newline. The caller frees it; NULL without memory. */
 char *io_json_format(json_t *value);

@@ -5,6 +5,7 @@
 #ifndef RENDERER_COST_H
 #define RENDERER_COST_H
 
+#include "renderer/gather.h"
 #include "renderer/plan.h"
 
 #include <math.h>
@@ -35,12 +36,12 @@
 #define RENDER_COST_COMPOSITE_PIXEL 45.0  /* covered                                      */
 #define RENDER_COST_SPLAT_EVALUATION 2.8  /* one sample at one pixel                      */
 #define RENDER_COST_SPLAT_FRAGMENT 12.0   /* one pixel of a splat of one sample    */
-#define RENDER_COST_GATHER_EVALUATION 0.7 /* one sample at one place, if slopes spared none */
+#define RENDER_COST_GATHER_EVALUATION 0.9 /* one merged sample at one place               */
 #define RENDER_COST_GREY_SHARE 0.6        /* of an evaluation, where channels are alike */
-#define RENDER_COST_GATHER_PIXEL 60.0     /* interpolated                                 */
-#define RENDER_COST_GATHER_SAMPLE 70.0    /* ordered and merged                           */
-#define RENDER_COST_GATHER_PLACE 100.0    /* read back, its tile's lists made     */
-#define RENDER_COST_GATHER_GL 9.0         /* one merged sample at one place, by llvmpipe        */
+#define RENDER_COST_GATHER_PIXEL 30.0     /* interpolated                                 */
+#define RENDER_COST_GATHER_SAMPLE 135.0   /* ordered and merged                           */
+#define RENDER_COST_GATHER_PLACE 85.0     /* read back, its tile's lists made     */
+#define RENDER_COST_GATHER_GL 6.5         /* one merged sample at one place, by llvmpipe        */
 #define RENDER_COST_MAP_TEXEL 37.0        /* of a translucent shadow map: drawn, levels made  */
 #define RENDER_COST_MAP_SAMPLE 66.0       /* one sample of a map at one point             */
 #define RENDER_COST_MAP_LAYER 25.0        /* each layer that it looks into                */
@@ -246,11 +247,34 @@ static inline double render_cost_samples(const struct render_plan *plan)
     return excess * (double)plan->lit_count * count + render_cost_sky_samples(plan);
 }
 
-/* The same of gathering: the finest band at each pixel, others at a third as many places in all. */
+/* Places at which a band is summed, for each pixel of an object: at the level that how far apart they may
+ * be (T43) leads to, and at each below it where surfaces are at a slant or end. For the bounds, third
+ * derivatives are taken for 1/cap^3 of what is lit and 1/change^3 of what is there, second ones for
+ * 0.4/cap^2 and 1/change^2. */
+static inline double render_cost_gather_places(const struct render_plan *plan, enum render_gather gather,
+                                               const struct render_plan_object *object, int band)
+{
+    const double edge_px = 6; /* times the square root of the pixels: those that lie at edges */
+    const struct render_plan_medium *const medium = &plan->of_medium[object->medium];
+    const double pixel_mm = render_plan_pixel_mm(plan, object);
+    const double lit_mm = medium->bands[band].cap_mm, own_mm = medium->change_mm[band];
+    const double lit_epsilon = plan->interpolation_epsilon, own_epsilon = plan->own_epsilon;
+    const double apart_mm = gather == RENDER_GATHER_C
+                                ? fmin(cbrt(12 * lit_epsilon) * lit_mm, cbrt(12 * own_epsilon) * own_mm)
+                                : fmin(sqrt(5 * lit_epsilon) * lit_mm, sqrt(2 * own_epsilon) * own_mm);
+    const double apart_px = apart_mm / pixel_mm;
+    if (apart_px < 2)
+        return 1;
+    const int level = (int)fmin(floor(log2(apart_px)), RENDER_GATHER_LEVELS - 1);
+    const double at_edges = 2 * (1 - ldexp(1, -level)) * edge_px / sqrt(fmax(object->pixel_count, 1));
+    return fmin(ldexp(1, -2 * level) + level / (apart_px * apart_px) + at_edges, 1);
+}
+
+/* The same of gathering, band by band. */
 static inline double render_cost_gather_evaluations(const struct render_plan *plan,
                                                     enum render_gather gather)
 {
-    const double pi = 3.14159265358979323846, excess = 2.5, around = plan->has_environment ? 1 : 0;
+    const double pi = 3.14159265358979323846, excess = 1.1, around = plan->has_environment ? 1 : 0;
     double count = 0;
     for (size_t i = 0; i < plan->media->object_count; i++) {
         const struct render_plan_object *const object = &plan->objects[i];
@@ -260,13 +284,13 @@ static inline double render_cost_gather_evaluations(const struct render_plan *pl
             gather == RENDER_GATHER_C && render_medium_is_grey(&plan->media->media[object->medium])
                 ? RENDER_COST_GREY_SHARE
                 : 1;
-        for (int b = 0; b < medium->band_count && b < 2; b++) {
+        for (int b = 0; b < medium->band_count; b++) {
             const struct render_band *const band = &medium->bands[b];
             const double reached_mm2 = pi * band->r_outer_mm * band->r_outer_mm;
             const double area_mm2 = (plan->lit_count > 0 || around == 0 ? fmin(reached_mm2, lit_mm2) : 0) +
                                     around * fmin(reached_mm2, 2 * lit_mm2);
-            count += share * (b == 0 ? 1 : 0.6) * object->pixel_count * area_mm2 /
-                     (band->spacing_mm * band->spacing_mm);
+            count += share * render_cost_gather_places(plan, gather, object, b) * object->pixel_count *
+                     area_mm2 / (band->spacing_mm * band->spacing_mm);
         }
     }
     return excess * count;

@@ -9,10 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Interpolation may err by so many epsilon of what is there, by a bound that is seldom met: in the dark,
- * where epsilon of the lit is much, it is the one that counts. */
-#define OWN_SHARE 4
-
 struct render_gatherer {
     size_t medium_count;
     struct render_band_key *keys; /* of each medium: what its kernels were made for */
@@ -99,16 +95,6 @@ static void sort_object(void *context, int index)
     all->objects[o].sources = &all->sources[o];
 }
 
-/* Pixels are as far apart as this on the object's near side. */
-static double pixel_mm(const struct render_plan *plan, const struct render_plan_object *object)
-{
-    if (plan->camera.is_orthographic)
-        return plan->pixel_mm;
-    double in_view_mm[3];
-    render_projection_to_view(&plan->camera, object->ball.centre_mm, in_view_mm);
-    return plan->pixel_mm * fmax(in_view_mm[2] - object->ball.radius_mm, plan->camera.near_mm);
-}
-
 static void describe_objects(const struct render_gatherer *gatherer, const struct render_plan *plan,
                              struct objects *all)
 {
@@ -117,7 +103,7 @@ static void describe_objects(const struct render_gatherer *gatherer, const struc
         const size_t o = plan->has_object_ids ? i : 0;
         if (!(planned->spacing_mm > 0))
             continue;
-        const double apart_mm = pixel_mm(plan, planned);
+        const double apart_mm = render_plan_pixel_mm(plan, planned);
         struct render_gather_object *const object = &all->objects[o];
         object->pixel_mm = object->medium ? fmin(object->pixel_mm, apart_mm) : apart_mm;
         object->medium = &gatherer->media[planned->medium];
@@ -226,7 +212,7 @@ static bool make_request(const struct render_frame *frame, const struct objects 
                                                .objects = all->objects,
                                                .object_count = all->count,
                                                .epsilon = plan->interpolation_epsilon,
-                                               .own_epsilon = OWN_SHARE * plan->epsilon };
+                                               .own_epsilon = plan->own_epsilon };
     return true;
 }
 

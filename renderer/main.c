@@ -1,5 +1,6 @@
 /* render: draw a scene of translucent objects. */
 #include "cli/cli.h"
+#include "io/json.h"
 #include "renderer/output.h"
 #include "renderer/plan.h"
 #include "renderer/reference.h"
@@ -7,7 +8,6 @@
 #include "renderer/volumes.h"
 #include "renderer/window/view.h"
 
-#include <jansson.h>
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -61,12 +61,6 @@ static const int sample_counts[] = { 0, 13, 21, 53, 117, 245 };
 
 /* ---- results ------------------------------------------------------------------------------------ */
 
-/* null where nothing bounds an error, or no time was predicted. */
-static json_t *create_number(double number)
-{
-    return isfinite(number) ? json_real(number) : json_null();
-}
-
 /* The most memory that this process has had at once, so far. */
 static json_int_t peak_rss_bytes(void)
 {
@@ -82,14 +76,14 @@ static json_t *create_result(const struct render_report *report, const char *pat
         const struct render_effect_report *const effect = &report->effects[e];
         json_array_append_new(effects, json_pack("{s:s, s:b, s:s, s:o, s:f, s:o}", "name", effect->name,
                                                  "active", effect->is_active, "reason", effect->reason,
-                                                 "predicted_ms", create_number(effect->predicted_ms), "ms",
-                                                 effect->time_ms, "error", create_number(effect->error)));
+                                                 "predicted_ms", io_json_number(effect->predicted_ms), "ms",
+                                                 effect->time_ms, "error", io_json_number(effect->error)));
     }
     return json_pack("{s:s, s:f, s:o*, s:o, s:o, s:o, s:f, s:I, s:s?}", "technique",
                      render_technique_names[report->technique], "epsilon", report->epsilon, "budget_ms",
                      report->budget_ms > 0 ? json_real(report->budget_ms) : NULL, "error_predicted",
-                     create_number(report->error_predicted), "predicted_ms",
-                     create_number(report->predicted_ms), "effects", effects, "total_ms", report->total_ms,
+                     io_json_number(report->error_predicted), "predicted_ms",
+                     io_json_number(report->predicted_ms), "effects", effects, "total_ms", report->total_ms,
                      "peak_rss_bytes", peak_rss_bytes(), "image", path);
 }
 

@@ -128,6 +128,15 @@ bool render_plan_sums_samples(const struct render_plan *plan)
     return plan->technique == RENDER_TECHNIQUE_SPLAT || plan->technique == RENDER_TECHNIQUE_GATHER;
 }
 
+double render_plan_pixel_mm(const struct render_plan *plan, const struct render_plan_object *object)
+{
+    if (plan->camera.is_orthographic)
+        return plan->pixel_mm;
+    double in_view_mm[3];
+    render_projection_to_view(&plan->camera, object->ball.centre_mm, in_view_mm);
+    return plan->pixel_mm * fmax(in_view_mm[2] - object->ball.radius_mm, plan->camera.near_mm);
+}
+
 bool render_light_shines(const struct io_light *light)
 {
     return light->rgb[0] > 0 || light->rgb[1] > 0 || light->rgb[2] > 0;
@@ -387,6 +396,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_spend_epsilon(request, plan);
         tell_objects_apart(request, plan);
         choose_technique(request, plan);
+        render_plan_spend_on_gathering(request, plan);
         render_plan_choose_cells(request, plan);
         done = render_plan_light_from_around(request, plan, status) &&
                render_plan_make_views(request, plan, status) &&

@@ -196,6 +196,9 @@ struct render_plan_medium {
     double spread_mm;                 /* of the light that is put together in one, T79; 0 of a grid */
     struct render_band bands[RENDER_BAND_LIMIT]; /* none unless splatted or captured */
     int band_count;
+    /* About how far one has to go for a gathered band and all beyond it to change by as much as they are; 0
+     * for the finest, and where nothing is gathered. */
+    double change_mm[RENDER_BAND_LIMIT];
     double inner_mm; /* of the pattern of samples of translucent shadow maps     */
     double truncation_error, aliasing_error, blur_error, table_error;
 };
@@ -240,7 +243,9 @@ struct render_plan {
 
     /* The error budget: shares of epsilon, then what they lead to, of the worst medium. */
     double truncation_epsilon, aliasing_epsilon, banding_epsilon, table_epsilon;
-    double interpolation_epsilon; /* of gathering alone */
+    /* Of gathering alone: what interpolation may err by, of what is lit and of what is there; samples of
+     * the finest band are merged in cubes so many spacings wide. */
+    double interpolation_epsilon, own_epsilon, finest_spacings;
     double truncation_error, aliasing_error, blur_error, banding_error, table_error, environment_error,
         error_predicted;
     double r_max_mm;   /* the farthest medium's                            */
@@ -357,6 +362,9 @@ DIPOLE_CHECKED bool render_plan_check_rays(int ray_count, dipole_status *status)
 
 /* Why nothing is lit; NULL when something may be. */
 const char *render_plan_dark_reason(const struct render_plan *plan);
+
+/* Pixels are as far apart as this on the object's near side. */
+double render_plan_pixel_mm(const struct render_plan *plan, const struct render_plan_object *object);
 
 /* The texels of the largest map; 0 when there is none. */
 int render_plan_map_side_px(const struct render_plan *plan);

@@ -23,6 +23,10 @@
 #define GATHER_BANDING_SHARE 0.5
 #define GATHER_INTERPOLATION_SHARE 0.2
 
+/* Interpolation may err by so many epsilon of what is there, by a bound that is seldom met: in the dark,
+ * where epsilon of the lit is much, it is the one that counts. */
+#define GATHER_OWN_SHARE 4
+
 /* Caps of so many spacings keep the bands of splats under their share of epsilon = 0.01; for a tenth of
  * that, so many more are needed. */
 #define CAP_SPACINGS 8
@@ -245,6 +249,18 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     plan->r_max_px = plan->r_max_mm / (plan->pixel_mm * nearest_mm);
 }
 
+void render_plan_spend_on_gathering(const struct render_request *request, struct render_plan *plan)
+{
+    if (plan->technique != RENDER_TECHNIQUE_GATHER)
+        return;
+    plan->banding_epsilon = fmin(limit_or(request->limits.banding, GATHER_BANDING_SHARE * plan->epsilon),
+                                 RENDER_GATHER_MERGING_ERROR_MAX);
+    plan->interpolation_epsilon =
+        limit_or(request->limits.interpolation, GATHER_INTERPOLATION_SHARE * plan->epsilon);
+    plan->own_epsilon = GATHER_OWN_SHARE * plan->epsilon;
+    plan->finest_spacings = render_gather_finest_spacings(plan->banding_epsilon);
+}
+
 /* Of each channel that would alias by more than its share. */
 static void blur_channels(const struct render_plan *plan, const struct render_medium *medium,
                           double spacing_mm, struct render_plan_medium *planned)
@@ -276,6 +292,28 @@ static double closest_spacing_mm(const struct render_plan *plan, size_t medium, 
     return fmax(closest_mm, texel_mm);
 }
 
+/* Channels of which less lies beyond a cap are too dark there for gathering to look at. */
+#define VISIBLE_SHARE 1e-5
+
+/* A cap adds so much over its width to how fast the profile falls beyond it (measured materials). */
+#define CAP_CHANGE 1.7
+
+/* About how far one has to go for what lies beyond a cap to change by as much as it is, of the channel that
+ * falls fastest: from how much of it lies beyond two caps. */
+static double change_mm(const struct render_medium *medium, double cap_mm)
+{
+    double fastest_per_mm = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (!(medium->diffuse_reflectance[c] > 0))
+            continue;
+        const double beyond = tail(medium->stacks[c], cap_mm, 0),
+                     farther = tail(medium->stacks[c], 2 * cap_mm, 0);
+        if (beyond > VISIBLE_SHARE && farther > 0)
+            fastest_per_mm = fmax(fastest_per_mm, log(beyond / farther) / cap_mm);
+    }
+    return 1 / (fastest_per_mm + CAP_CHANGE / cap_mm);
+}
+
 static void settle_medium(const struct render_request *request, struct render_plan *plan, size_t index,
                           double texel_mm)
 {
@@ -292,8 +330,7 @@ static void settle_medium(const struct render_request *request, struct render_pl
     const double decades = fmax(log10(CAP_EPSILON / plan->epsilon), 0);
     const double cap_spacings = is_gathered ? render_gather_cap_spacings(plan->banding_epsilon)
                                             : CAP_SPACINGS + CAP_SPACINGS_PER_DECADE * decades;
-    const double finest_mm =
-        (is_gathered ? render_gather_finest_spacings(plan->banding_epsilon) : 1) * planned->spacing_mm;
+    const double finest_mm = (is_gathered ? plan->finest_spacings : 1) * planned->spacing_mm;
     const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
     const double on_slopes_mm = spacing_mm * fmin(fmax(spacing_mm / wanted_mm, 1), SLOPE_LIMIT);
     planned->spread_mm = !is_gathered || request->is_captured
@@ -315,6 +352,8 @@ static void settle_medium(const struct render_request *request, struct render_pl
     planned->band_count =
         render_bands_make(finest_mm, reach_mm, is_single ? INFINITY : cap_spacings, planned->bands);
     plan->band_count = planned->band_count > plan->band_count ? planned->band_count : plan->band_count;
+    for (int b = 1; is_gathered && b < planned->band_count; b++)
+        planned->change_mm[b] = change_mm(medium, planned->bands[b].cap_mm);
     if (request->is_captured)
         return;
     if (spacing_mm > wanted_mm * (1 + 1e-6))
@@ -332,13 +371,6 @@ void render_plan_settle_spacing(const struct render_request *request, struct ren
     if (!render_plan_sums_samples(plan))
         return;
     const double texel_mm = render_plan_widest_spacing_mm(plan);
-    if (plan->technique == RENDER_TECHNIQUE_GATHER) {
-        plan->banding_epsilon =
-            fmin(limit_or(request->limits.banding, GATHER_BANDING_SHARE * plan->epsilon),
-                 RENDER_GATHER_MERGING_ERROR_MAX);
-        plan->interpolation_epsilon =
-            limit_or(request->limits.interpolation, GATHER_INTERPOLATION_SHARE * plan->epsilon);
-    }
     for (size_t m = 0; m < plan->media->count; m++)
         settle_medium(request, plan, m, texel_mm);
 }

@@ -3,8 +3,8 @@
 
 #include <math.h>
 
-/* Sides of the cubes that samples are gathered in, as part of the spacing: surfaces cut cubes at all
- * angles; so narrow they err no more than the light's grid does (measured, docs/motion.md). */
+/* Sides of the cubes that samples are gathered in, as part of the spacing, at the most: surfaces cut cubes
+ * at all angles; so narrow they err no more than the light's grid does (measured, docs/motion.md). */
 #define CELL_SHARE 0.6
 
 const char *const render_coherence_names[] = { "auto", "none", "two-pass", "surface", NULL };
@@ -48,9 +48,13 @@ void render_plan_choose_cells(const struct render_request *request, struct rende
         plan->coherence = RENDER_COHERENCE_NONE;
     if (plan->coherence != RENDER_COHERENCE_SURFACE)
         return;
+    const bool is_gathered = plan->technique == RENDER_TECHNIQUE_GATHER;
+    const double share = is_gathered ? fmin(plan->finest_spacings, CELL_SHARE) : CELL_SHARE;
+    if (is_gathered) /* merged in the same cubes */
+        plan->finest_spacings = share;
     for (size_t i = 0; i < request->scene->object_count; i++)
         plan->objects[i].cell_mm =
-            CELL_SHARE * plan->objects[i].spacing_mm / io_object_stretch(&request->scene->objects[i]);
+            share * plan->objects[i].spacing_mm / io_object_stretch(&request->scene->objects[i]);
     if (request->scene->object_count > 1 && !plan->has_object_ids) {
         plan->has_object_ids = true;
         plan->ids_reason = "samples stay on the surfaces of several objects";
@@ -60,7 +64,8 @@ void render_plan_choose_cells(const struct render_request *request, struct rende
 int render_plan_code_level(const struct render_plan *plan, size_t object)
 {
     const struct render_plan_object *const planned = &plan->objects[object];
-    const double stretched_mm = CELL_SHARE * planned->spacing_mm; /* of a cube, where it is widest */
+    const double stretched_mm =
+        plan->finest_spacings * planned->spacing_mm; /* a cube, where it is widest */
     const double wanted_mm = plan->of_medium[planned->medium].bands[0].spacing_mm;
     return stretched_mm > 0 ? (int)floor(log2(wanted_mm / stretched_mm) + 0.1) : 0;
 }
