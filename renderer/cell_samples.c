@@ -1,5 +1,6 @@
 #include "renderer/cell_samples.h"
 
+#include "lutgen/parallel.h"
 #include "renderer/z_order.h"
 
 #include <assert.h>
@@ -7,136 +8,184 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIRST_SLOTS = 1 << 14 };
-
 /* Of the cube that the coordinates begin in: a multiple of this many cubes from the world's origin, so that
  * meshes of a sequence share their cubes. */
 #define ORIGIN_CELLS 128.0
 
+/* ---- texels by their cubes ----------------------------------------------------------------------- */
+
+/* Cubes of an object at rest. */
+struct grid {
+    double min_mm[3], cell_mm;
+};
+
+/* Lit texels: those of a row that lie in one cube behind each other have one key. */
+struct lit_texels {
+    const struct render_light_target *targets;
+    const struct render_light_view *view;
+    size_t *first_of_row; /* room for keys, a lit texel each; and one past the last */
+    size_t *count_of_row; /* keys that there are */
+    struct render_z_key *keys;
+};
+
+static struct grid grid_of(const struct render_light_target *target)
+{
+    struct grid grid = { .cell_mm = target->cell_mm };
+    const double step_mm = ORIGIN_CELLS * target->cell_mm;
+    for (int k = 0; k < 3; k++)
+        grid.min_mm[k] = step_mm * floor(target->origin_mm[k] / step_mm);
+    return grid;
+}
+
+static uint64_t code_of(const struct grid *grid, const float rest_mm[3])
+{
+    double cell[3];
+    for (int k = 0; k < 3; k++)
+        cell[k] = ((double)rest_mm[k] - grid->min_mm[k]) / grid->cell_mm;
+    return render_z_order(cell);
+}
+
+/* The object that a texel gives a sample to; -1: to none. */
+static int lit_object(const struct lit_texels *lit, size_t texel)
+{
+    const struct render_light_view *const view = lit->view;
+    const int object = view->objects ? (int)view->objects[texel] - 1 : 0;
+    return view->texels[4 * texel + 3] > 0 && object >= 0 && lit->targets[object].samples ? object : -1;
+}
+
+static void count_row(void *context, int row)
+{
+    const struct lit_texels *const lit = context;
+    const size_t side_px = (size_t)lit->view->size_px, first = (size_t)row * side_px;
+    size_t count = 0;
+    for (size_t i = first; i < first + side_px; i++)
+        count += lit_object(lit, i) >= 0;
+    lit->first_of_row[row + 1] = count;
+}
+
+static void fill_row(void *context, int row)
+{
+    const struct lit_texels *const lit = context;
+    const size_t side_px = (size_t)lit->view->size_px, first = (size_t)row * side_px;
+    struct render_z_key *const keys = lit->keys + lit->first_of_row[row];
+    struct grid grid;
+    size_t count = 0;
+    for (size_t i = first, of_grid = SIZE_MAX; i < first + side_px; i++) {
+        const int object = lit_object(lit, i);
+        if (object < 0)
+            continue;
+        if (of_grid != (size_t)object) {
+            grid = grid_of(&lit->targets[object]);
+            of_grid = (size_t)object;
+        }
+        const uint64_t code = code_of(&grid, lit->view->rest_mm + 4 * i);
+        struct render_z_key *const last = &keys[count > 0 ? count - 1 : 0];
+        if (count > 0 && last->code == code && (int)last->object == object &&
+            last->index + (size_t)last->count == i)
+            last->count++;
+        else
+            keys[count++] =
+                (struct render_z_key){ .code = code, .index = i, .object = (float)object, .count = 1 };
+    }
+    lit->count_of_row[row] = count;
+}
+
+/* Put the rows' keys one behind the other; returns how many there are. */
+static size_t close_up(const struct lit_texels *lit)
+{
+    size_t count = 0;
+    for (int row = 0; row < lit->view->size_px; row++) {
+        memmove(lit->keys + count, lit->keys + lit->first_of_row[row],
+                lit->count_of_row[row] * sizeof *lit->keys);
+        count += lit->count_of_row[row];
+    }
+    return count;
+}
+
+/* ---- cubes --------------------------------------------------------------------------------------- */
+
 /* What a cube has gathered. */
 struct cell {
-    uint64_t code;
-    int object; /* -1: a free slot */
-    int texel_count;
+    int object, texel_count;
     double irradiance, arriving[3];
     struct render_spread_sums sums;
     float min[3], max[3];
 };
 
-/* An open hash table. */
+/* A sample for each cube. */
 struct cells {
-    struct cell *slots;
-    size_t slot_count, used_count; /* slot_count: a power of two */
+    const struct render_light_target *targets;
+    const struct render_light_view *view;
+    const struct render_z_key *keys; /* of texels, cube by cube */
+    size_t *first_keys;              /* of each cube, and one past the last */
+    size_t count;
+    struct render_light_sample *samples;
 };
 
-static uint64_t mix(uint64_t x)
+static bool is_new_cell(const struct render_z_key *keys, size_t i)
 {
-    x ^= x >> 31;
-    x *= 0x9e3779b97f4a7c15u;
-    x ^= x >> 29;
-    x *= 0xbf58476d1ce4e5b9u;
-    return x ^ x >> 32;
+    return i == 0 || keys[i].code != keys[i - 1].code || keys[i].object != keys[i - 1].object;
 }
 
-uint64_t render_cell_hash(uint64_t code, int object)
+static void add_texel(const struct render_light_view *view, size_t index, struct cell *cell)
 {
-    return mix(code ^ (uint64_t)object << 48);
-}
-
-static struct cell *find_slot(const struct cells *cells, uint64_t code, int object)
-{
-    size_t i = (size_t)render_cell_hash(code, object) & (cells->slot_count - 1);
-    while (cells->slots[i].object >= 0 &&
-           (cells->slots[i].code != code || cells->slots[i].object != object))
-        i = (i + 1) & (cells->slot_count - 1);
-    return &cells->slots[i];
-}
-
-/* Room for twice as many. */
-static bool grow(struct cells *cells, dipole_status *status)
-{
-    struct cells grown = { .slot_count = cells->slot_count ? 2 * cells->slot_count : FIRST_SLOTS,
-                           .used_count = cells->used_count };
-    grown.slots = calloc(grown.slot_count, sizeof *grown.slots);
-    if (!grown.slots)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
-                           grown.slot_count);
-    for (size_t i = 0; i < grown.slot_count; i++)
-        grown.slots[i].object = -1;
-    for (size_t i = 0; i < cells->slot_count; i++) {
-        if (cells->slots[i].object >= 0)
-            *find_slot(&grown, cells->slots[i].code, cells->slots[i].object) = cells->slots[i];
-    }
-    free(cells->slots);
-    *cells = grown;
-    return true;
-}
-
-static bool find_cell(struct cells *cells, uint64_t code, int object, struct cell **cell_out,
-                      dipole_status *status)
-{
-    if (2 * (cells->used_count + 1) > cells->slot_count && !grow(cells, status))
-        return false;
-    struct cell *const cell = find_slot(cells, code, object);
-    if (cell->object < 0) {
-        *cell = (struct cell){ .code = code,
-                               .object = object,
-                               .min = { INFINITY, INFINITY, INFINITY },
-                               .max = { -INFINITY, -INFINITY, -INFINITY } };
-        cells->used_count++;
-    }
-    *cell_out = cell;
-    return true;
-}
-
-static uint64_t code_of(const struct render_light_target *target, const float rest_mm[3])
-{
-    double cell[3];
-    for (int k = 0; k < 3; k++) {
-        const double step_mm = ORIGIN_CELLS * target->cell_mm;
-        const double origin_mm = step_mm * floor(target->origin_mm[k] / step_mm);
-        cell[k] = floor(((double)rest_mm[k] - origin_mm) / target->cell_mm);
-    }
-    return render_z_order(cell);
-}
-
-static void add_texel(struct cell *cell, const float texel[4], double irradiance)
-{
+    const float *const texel = view->texels + 4 * index;
+    const size_t side_px = (size_t)view->size_px;
     render_spread_add(&cell->sums, (double)texel[3], (double)texel[0], (double)texel[1], (double)texel[2]);
-    cell->irradiance += irradiance;
+    cell->irradiance += view->irradiance ? (double)view->irradiance[index] : 0;
     cell->texel_count++;
     for (int k = 0; k < 3; k++) {
         cell->min[k] = fminf(cell->min[k], texel[k]);
         cell->max[k] = fmaxf(cell->max[k], texel[k]);
     }
+    render_light_view_add_shadow(view, (int)(index % side_px), (int)(index / side_px), (double)texel[3],
+                                 cell->arriving);
 }
 
-static bool gather(const struct render_light_target *targets, const struct render_light_view *view,
-                   struct cells *cells, dipole_status *status)
+static struct render_light_sample sample_of(const struct render_light_target *target,
+                                            const struct render_light_view *view, const struct cell *cell)
 {
-    const size_t texel_count = (size_t)view->size_px * (size_t)view->size_px;
-    for (size_t i = 0; i < texel_count; i++) {
-        const float *const texel = view->texels + 4 * i;
-        const int object = view->objects ? (int)view->objects[i] - 1 : 0;
-        if (!(texel[3] > 0) || object < 0 || !targets[object].samples)
-            continue;
-        struct cell *cell;
-        if (!find_cell(cells, code_of(&targets[object], view->rest_mm + 4 * i), object, &cell, status))
-            return false;
-        add_texel(cell, texel, view->irradiance ? (double)view->irradiance[i] : 0);
-        render_light_view_add_shadow(view, (int)(i % (size_t)view->size_px),
-                                     (int)(i / (size_t)view->size_px), (double)texel[3], cell->arriving);
+    const double share = cell->sums.weight, texel_count = cell->texel_count;
+    const double flux = view->irradiance ? cell->irradiance / texel_count : share;
+    struct render_light_sample sample = { .object = (float)cell->object };
+    double diagonal2 = 0;
+    for (int k = 0; k < 3; k++) {
+        const double extent = (double)cell->max[k] - (double)cell->min[k];
+        diagonal2 += extent * extent;
+        sample.position_mm[k] = (float)(cell->sums.first[k] / share);
+        sample.flux_w[k] = (float)(flux * view->rgb[k] * (view->shadows ? cell->arriving[k] / share : 1));
     }
-    return true;
+    sample.footprint_mm = (float)sqrt(diagonal2);
+    /* of texels as wide as they are, not of their middles alone */
+    render_spread_of(&cell->sums, texel_count > 1 ? texel_count / (texel_count - 1) : 0, target->spacing_mm,
+                     sample.spread_mm2);
+    return sample;
 }
 
-/* By object and code, which no two cells share. */
-static int compare_cells(const void *a, const void *b)
+static void fill_cell(const struct cells *cells, size_t index)
 {
-    const struct cell *const x = a, *const y = b;
-    if (x->object != y->object)
-        return x->object < y->object ? -1 : 1;
-    return x->code < y->code ? -1 : x->code > y->code;
+    const struct render_light_view *const view = cells->view;
+    const size_t first = cells->first_keys[index], end = cells->first_keys[index + 1];
+    struct cell cell = { .object = (int)cells->keys[first].object,
+                         .min = { INFINITY, INFINITY, INFINITY },
+                         .max = { -INFINITY, -INFINITY, -INFINITY } };
+    for (size_t i = first; i < end; i++) {
+        const size_t texel_first = cells->keys[i].index;
+        for (size_t texel = texel_first; texel < texel_first + (size_t)cells->keys[i].count; texel++)
+            add_texel(view, texel, &cell);
+    }
+    cells->samples[index] = sample_of(&cells->targets[cell.object], view, &cell);
+}
+
+/* So many cubes are filled by one thread at a time. */
+enum { BLOCK_SIZE = 1024 };
+
+static void fill_block(void *context, int block)
+{
+    const struct cells *const cells = context;
+    const size_t first = (size_t)block * BLOCK_SIZE;
+    for (size_t i = first; i < cells->count && i < first + BLOCK_SIZE; i++)
+        fill_cell(cells, i);
 }
 
 static bool append(struct render_light_samples *samples, const struct render_light_sample *sample,
@@ -156,42 +205,66 @@ static bool append(struct render_light_samples *samples, const struct render_lig
     return true;
 }
 
-static bool append_cell(const struct render_light_target *targets, const struct render_light_view *view,
-                        const struct cell *cell, dipole_status *status)
+static bool append_cells(struct cells *cells, size_t key_count, dipole_status *status)
 {
-    const double share = cell->sums.weight, texel_count = cell->texel_count;
-    const double flux = view->irradiance ? cell->irradiance / texel_count : share;
-    struct render_light_sample sample = { .object = (float)cell->object };
-    double diagonal2 = 0;
-    for (int k = 0; k < 3; k++) {
-        const double extent = (double)cell->max[k] - (double)cell->min[k];
-        diagonal2 += extent * extent;
-        sample.position_mm[k] = (float)(cell->sums.first[k] / share);
-        sample.flux_w[k] = (float)(flux * view->rgb[k] * (view->shadows ? cell->arriving[k] / share : 1));
+    for (size_t i = 0; i < key_count; i++)
+        cells->count += is_new_cell(cells->keys, i);
+    cells->first_keys = malloc((cells->count + 1) * sizeof *cells->first_keys);
+    cells->samples = malloc((cells->count + 1) * sizeof *cells->samples);
+    if (!cells->first_keys || !cells->samples)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu light samples",
+                           cells->count);
+    for (size_t i = 0, next = 0; i < key_count; i++) {
+        if (is_new_cell(cells->keys, i))
+            cells->first_keys[next++] = i;
     }
-    sample.footprint_mm = (float)sqrt(diagonal2);
-    /* of texels as wide as they are, not of their middles alone */
-    render_spread_of(&cell->sums, texel_count > 1 ? texel_count / (texel_count - 1) : 0,
-                     targets[cell->object].spacing_mm, sample.spread_mm2);
-    return append(targets[cell->object].samples, &sample, cell->code, status);
+    cells->first_keys[cells->count] = key_count;
+    lut_parallel_for((int)((cells->count + BLOCK_SIZE - 1) / BLOCK_SIZE), 0, fill_block, cells);
+    bool done = true;
+    for (size_t i = 0; done && i < cells->count; i++) {
+        const struct render_z_key *const key = &cells->keys[cells->first_keys[i]];
+        done = append(cells->targets[(int)key->object].samples, &cells->samples[i], key->code, status);
+    }
+    return done;
+}
+
+static bool append_texels(struct lit_texels *lit, dipole_status *status)
+{
+    const int side_px = lit->view->size_px;
+    lut_parallel_for(side_px, 0, count_row, lit);
+    for (int row = 0; row < side_px; row++)
+        lit->first_of_row[row + 1] += lit->first_of_row[row];
+    const size_t texel_count = lit->first_of_row[side_px];
+    lit->keys = malloc(2 * (texel_count + 1) * sizeof *lit->keys);
+    if (!lit->keys)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu lit texels", texel_count);
+    lut_parallel_for(side_px, 0, fill_row, lit);
+    const size_t count = close_up(lit);
+    struct cells cells = { .targets = lit->targets,
+                           .view = lit->view,
+                           .keys = render_light_samples_sort_keys(lit->keys, lit->keys + count, count) };
+    const bool done = append_cells(&cells, count, status);
+    free(cells.first_keys);
+    free(cells.samples);
+    return done;
 }
 
 bool render_cell_samples_append(const struct render_light_target *targets,
                                 const struct render_light_view *view, dipole_status *status)
 {
-    struct cells cells = { .slots = NULL };
+    const size_t side_px = (size_t)view->size_px;
+    struct lit_texels lit = { .targets = targets,
+                              .view = view,
+                              .first_of_row = calloc(side_px + 1, sizeof *lit.first_of_row),
+                              .count_of_row = calloc(side_px + 1, sizeof *lit.count_of_row) };
     assert(view->rest_mm);
-    bool done = gather(targets, view, &cells, status);
-    size_t count = 0;
-    for (size_t i = 0; done && i < cells.slot_count; i++) {
-        if (cells.slots[i].object >= 0)
-            cells.slots[count++] = cells.slots[i];
-    }
-    if (count > 0)
-        qsort(cells.slots, count, sizeof *cells.slots, compare_cells);
-    for (size_t i = 0; done && i < count; i++)
-        done = append_cell(targets, view, &cells.slots[i], status);
-    free(cells.slots);
+    const bool done = lit.first_of_row && lit.count_of_row
+                          ? append_texels(&lit, status)
+                          : dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                                        "no memory for a light's view of %d texels a side", view->size_px);
+    free(lit.first_of_row);
+    free(lit.count_of_row);
+    free(lit.keys);
     return done;
 }
 

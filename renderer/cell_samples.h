@@ -17,10 +17,6 @@
 DIPOLE_CHECKED bool render_cell_samples_append(const struct render_light_target *targets,
                                                const struct render_light_view *view, dipole_status *status);
 
-/* Where a cube of an object is looked for: its lowest bits tell apart both cubes and objects that share
- * them. */
-uint64_t render_cell_hash(uint64_t code, int object);
-
 /* Append to *merged one sample for each object in each cube 2^levels[object] times as wide. */
 DIPOLE_CHECKED bool render_cell_samples_merge(const struct render_light_samples *samples, const int *levels,
                                               struct render_light_samples *merged, dipole_status *status);

@@ -11,6 +11,7 @@ struct render_z_key {
     uint64_t code;
     size_t index;
     float object;
+    int count; /* of texels in a row from index on that are taken together: cell_samples.c */
 };
 
 /* Put two zeros between the low 21 bits. */

@@ -203,30 +203,11 @@ static void objects_are_not_taken_for_each_other(void **state)
     }
 }
 
-/* Oracle: chance. n keys of cubes side by side and their objects fall on n - n^2/2N of N slots, here 992 of
- * 1024, give or take 6: else objects that share a grid would be searched for one behind the other. */
-static void cubes_and_objects_are_spread_over_the_table(void **state)
-{
-    (void)state;
-    enum { SLOTS = 1 << 14, OBJECTS = 64, CODES = 16 };
-    static bool is_used[SLOTS];
-    size_t used_count = 0;
-    for (int object = 0; object < OBJECTS; object++) {
-        for (uint64_t code = 0; code < CODES; code++) {
-            bool *const slot = &is_used[render_cell_hash(code, object) & (SLOTS - 1)];
-            used_count += !*slot;
-            *slot = true;
-        }
-    }
-    assert_true(used_count > 992 - 4 * 6);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(objects_in_the_same_cube_stay_apart),
         cmocka_unit_test(objects_are_not_taken_for_each_other),
-        cmocka_unit_test(cubes_and_objects_are_spread_over_the_table),
         cmocka_unit_test(flux_and_its_middle_are_conserved),
         cmocka_unit_test(samples_move_with_the_surface),
         cmocka_unit_test(what_is_not_lit_gives_none),
