@@ -13,6 +13,8 @@
 /* Everything but the knob is as fine as this asks for. */
 #define FINE_EPSILON 0.003
 
+#define COARSEST_EPSILON 0.3
+
 /* ---- what scenes call for ----------------------------------------------------------------------- */
 
 static const char *no_environment(const struct accuracy_subject *subject)
@@ -54,6 +56,47 @@ static const char *no_shadow_maps(const struct accuracy_subject *subject)
     return no_blockers(subject) ? no_size(subject) : NULL;
 }
 
+/* ---- what is left out --------------------------------------------------------------------------- */
+
+static struct render_plan *plan_of(const struct accuracy_subject *subject, double epsilon,
+                                   bool keeps_negligible)
+{
+    struct render_request request = render_request_for(
+        subject->renderer,
+        &(struct render_options){ .epsilon = epsilon, .keeps_negligible = keeps_negligible });
+    struct render_plan *plan;
+    request.environment = subject->renderer->environment;
+    request.has_gpu = subject->renderer->has_gpu;
+    return render_plan_create(&request, &plan, NULL) ? plan : NULL;
+}
+
+static bool are_alike(const struct render_plan *a, const struct render_plan *b)
+{
+    for (size_t e = 0; e < a->effect_count; e++) {
+        if (a->decisions[e].is_active != b->decisions[e].is_active)
+            return false;
+    }
+    return a->environment_order == b->environment_order;
+}
+
+/* Whether the automatic choice leaves something out since it changes nothing by more than epsilon. */
+static bool leaves_out(const struct accuracy_subject *subject, double epsilon)
+{
+    struct render_plan *const least = plan_of(subject, epsilon, false), *const all =
+                                                                            plan_of(subject, epsilon, true);
+    const bool does = least && all && !are_alike(least, all);
+    render_plan_destroy(least);
+    render_plan_destroy(all);
+    return does;
+}
+
+/* The larger epsilon is, the more is left out. */
+static const char *nothing_left_out(const struct accuracy_subject *subject)
+{
+    return leaves_out(subject, COARSEST_EPSILON) ? NULL
+                                                 : "nothing that the scene has is too little to be seen";
+}
+
 /* ---- settings ----------------------------------------------------------------------------------- */
 
 static bool set_epsilon(const struct accuracy_knob *knob, struct accuracy_subject *subject, double value,
@@ -63,6 +106,18 @@ static bool set_epsilon(const struct accuracy_knob *knob, struct accuracy_subjec
     (void)subject;
     (void)status;
     setting->drawing.epsilon = value;
+    return true;
+}
+
+static bool set_kept(const struct accuracy_knob *knob, struct accuracy_subject *subject, double value,
+                     struct accuracy_setting *setting, dipole_status *status)
+{
+    (void)knob;
+    (void)status;
+    setting->drawing.epsilon = value;
+    setting->drawing.keeps_negligible = true;
+    if (leaves_out(subject, value))
+        snprintf(setting->label, sizeof setting->label, "\u03b5 %.3g, all of it", value);
     return true;
 }
 
@@ -258,7 +313,7 @@ const struct accuracy_knob accuracy_knobs[] = {
       .what = "The error asked for, \u03b5: everything below is chosen by it.",
       .set = set_epsilon,
       .format = "ε %.3g",
-      .values = { 0.3, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003 },
+      .values = { COARSEST_EPSILON, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003 },
       .value_count = 8,
       .is_quick = true },
     { .name = "budget",
@@ -269,6 +324,15 @@ const struct accuracy_knob accuracy_knobs[] = {
       .format = "%.3g ms",
       .values = { 30, 60, 120, 300, 1000 },
       .value_count = 5 },
+    { .name = "kept",
+      .title = "Nothing left out",
+      .what =
+          "The automatic choice, with all that it leaves out since it changes nothing by more than \u03b5.",
+      .why_not = nothing_left_out,
+      .set = set_kept,
+      .values = { COARSEST_EPSILON, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003 },
+      .value_count = 8,
+      .is_quick = true },
     { .name = "splat",
       .title = "Splats, by \u03b5",
       .what = "The same error asked for, light samples drawn one by one.",

@@ -172,14 +172,10 @@ static bool sum_points(const struct bench *bench, const struct render_plan *plan
                        dipole_status *status)
 {
     const size_t medium = plan->objects[0].medium;
-    const struct render_plan_medium *const planned = &plan->of_medium[medium];
-    const struct render_table *const table = &bench->renderer->tables->of_medium[medium];
-    struct render_band_source source = { .table = table->lut,
-                                         .row = table->row,
-                                         .medium = &plan->media->media[medium] };
-    memcpy(source.blur_mm, planned->blur_mm, sizeof source.blur_mm);
+    const struct render_band_key key =
+        render_plan_band_key(plan, &bench->renderer->tables->of_medium[medium], medium);
     return (plan->technique == RENDER_TECHNIQUE_GATHER ? sum_gathered : sum_splats)(
-        bench, plan, &source, medium, radiosity, status);
+        bench, plan, &key.source, medium, radiosity, status);
 }
 
 static bool run(struct bench *bench, enum render_technique technique, enum render_coherence coherence,

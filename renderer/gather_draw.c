@@ -71,12 +71,14 @@ struct objects {
     size_t count;
     struct render_gather_object *objects;
     struct render_gather_sources *sources;
-    dipole_status *statuses;                 /* of each */
-    const struct render_plan_medium **media; /* of each */
-    struct render_light_sample *samples;     /* object by object */
-    int *code_levels;                        /* of each: render_plan_code_level */
-    uint64_t *codes;                         /* of their cubes at rest; NULL: they have none */
-    size_t *first;                           /* of each, and one past the last */
+    dipole_status *statuses;                   /* of each */
+    const struct render_plan_medium **media;   /* of each */
+    int *code_levels;                          /* of each: render_plan_code_level */
+    size_t *first;                             /* of each, and one past the last */
+    const struct render_light_sample *samples; /* object by object */
+    const uint64_t *codes;                     /* of their cubes at rest; NULL: they have none */
+    struct render_light_sample *own_samples;   /* NULL where the splatter's are in order already */
+    uint64_t *own_codes;
 };
 
 static void sort_object(void *context, int index)
@@ -120,8 +122,14 @@ static bool share_out_samples(const struct render_gatherer *gatherer, const stru
     for (size_t m = 0; m < gatherer->medium_count; m++)
         count += render_splatter_samples(splatter, m)->count;
     const bool has_codes = plan->coherence == RENDER_COHERENCE_SURFACE && !plan->has_environment;
-    all->samples = calloc(count + 1, sizeof *all->samples);
-    all->codes = has_codes ? calloc(count + 1, sizeof *all->codes) : NULL;
+    if (all->count == 1 && gatherer->medium_count == 1) {
+        all->samples = render_splatter_samples(splatter, 0)->samples;
+        all->codes = has_codes ? render_splatter_samples(splatter, 0)->codes : NULL;
+        all->first[1] = count;
+        return true;
+    }
+    all->samples = all->own_samples = calloc(count + 1, sizeof *all->own_samples);
+    all->codes = all->own_codes = has_codes ? calloc(count + 1, sizeof *all->own_codes) : NULL;
     size_t *const next = calloc(all->count + 1, sizeof *next);
     if (!all->samples || (has_codes && !all->codes) || !next) {
         free(next);
@@ -138,8 +146,8 @@ static bool share_out_samples(const struct render_gatherer *gatherer, const stru
                     continue;
                 }
                 if (has_codes)
-                    all->codes[next[o]] = of_medium->codes[i];
-                all->samples[next[o]++] = *sample;
+                    all->own_codes[next[o]] = of_medium->codes[i];
+                all->own_samples[next[o]++] = *sample;
             }
         }
         for (size_t o = 0; !is_placing && o < all->count; o++) {
@@ -159,8 +167,8 @@ static void objects_end(struct objects *all)
     free(all->sources);
     free(all->statuses);
     free((void *)all->media);
-    free(all->samples);
-    free(all->codes);
+    free(all->own_samples);
+    free(all->own_codes);
     free(all->code_levels);
     free(all->first);
 }

@@ -280,6 +280,18 @@ static void make_level(void *context, int band)
     shop->is_level_done[band] = level_init(shop->parts, shop->part_count, band, &shop->out->levels[band]);
 }
 
+/* What parts were merged from. */
+static void clear_away(struct workshop *shop)
+{
+    free(shop->sources);
+    free(shop->codes);
+    free(shop->keys);
+    free(shop->spare);
+    shop->sources = NULL;
+    shop->codes = NULL;
+    shop->keys = shop->spare = NULL;
+}
+
 static bool fill_levels(struct workshop *shop, const uint64_t *codes, int code_level, size_t count,
                         double finest_mm)
 {
@@ -291,6 +303,7 @@ static bool fill_levels(struct workshop *shop, const uint64_t *codes, int code_l
     bool done = true;
     for (int i = 0; i < shop->part_count; i++)
         done &= shop->parts[i].is_done;
+    clear_away(shop); /* millions of samples take gigabytes */
     if (done)
         lut_parallel_for(shop->out->band_count, 0, make_level, shop);
     for (int b = 0; done && b < shop->out->band_count; b++)
@@ -319,10 +332,7 @@ bool render_gather_sources_init(const struct render_light_sample *samples, const
         for (int b = 0; b < band_count; b++)
             free(shop.parts[i].merged[b]);
     }
-    free(shop.sources);
-    free(shop.codes);
-    free(shop.keys);
-    free(shop.spare);
+    clear_away(&shop);
     return done ||
            dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory to order %zu light samples", count);
 }

@@ -223,11 +223,8 @@ static void look_at_objects(const struct render_request *request, struct render_
         medium->is_visible = true;
         medium->diameter_mm = fmax(medium->diameter_mm, 2 * object->ball.radius_mm);
         plan->has_scattering |= plan->media->media[object->medium].has_scattering;
-        plan->has_specular |= scene->objects[i].has_specular;
-        plan->glossy_px += scene->objects[i].has_specular ? object->pixel_count : 0;
     }
     plan->covered_px = fmin(plan->covered_px, (double)plan->width_px * plan->height_px);
-    plan->glossy_px = fmin(plan->glossy_px, plan->covered_px);
 }
 
 static bool read_scene(const struct render_request *request, struct render_plan *plan,
@@ -247,6 +244,7 @@ static bool read_scene(const struct render_request *request, struct render_plan 
     for (size_t i = 0; i < scene->light_count; i++)
         plan->lit_count += render_light_shines(&scene->lights[i]);
     look_at_objects(request, plan);
+    render_plan_look_at_gloss(request, plan);
     render_plan_look_at_motion(request, plan);
     return true;
 }
@@ -280,7 +278,7 @@ static void tell_objects_apart(const struct render_request *request, struct rend
 static enum render_technique fastest_technique(const struct render_request *request,
                                                const struct render_plan *plan)
 {
-    if (plan->has_scattering && plan->r_max_px < 1)
+    if (plan->has_scattering && plan->r_max_px < 1 && !request->keeps_negligible)
         return RENDER_TECHNIQUE_LAMBERT;
     if (request->area != RENDER_AREA_FLUX || request->splat_grid != 0 ||
         plan->epsilon < RENDER_GATHER_EPSILON_MIN)

@@ -39,6 +39,7 @@ struct render_request {
     bool has_gpu;     /* OpenGL is not software */
     bool is_captured; /* no scattering; what it would need is kept instead */
     bool is_tone_mapped;
+    bool keeps_negligible; /* as in render_options */
 };
 
 enum render_draw_kind {
@@ -222,9 +223,10 @@ struct render_plan {
     struct render_media *own_media; /* when the request brought none                    */
     struct render_plan_object *objects;
     struct render_plan_medium *of_medium;
-    bool has_scattering; /* some visible medium's        */
-    bool has_specular;
-    bool has_object_ids;    /* objects are told apart: they differ, or are near each other */
+    bool has_scattering;          /* some visible medium's        */
+    bool is_glossy, has_specular; /* some visible object is; and it can be seen */
+    double gloss_most;   /* what the glossiest mirrors, of what a lit flat surface sends out, at the most */
+    bool has_object_ids; /* objects are told apart: they differ, or are near each other */
     const char *ids_reason; /* why, or why not                                             */
     size_t lit_count;       /* lights that are not black                        */
     bool has_environment;   /* that is drawn                                    */
@@ -247,7 +249,8 @@ struct render_plan {
      * the finest band are merged in cubes so many spacings wide. */
     double interpolation_epsilon, own_epsilon, finest_spacings;
     double truncation_error, aliasing_error, blur_error, banding_error, table_error, environment_error,
-        error_predicted;
+        gloss_error, error_predicted; /* gloss: 0 where it is drawn */
+    double flat_mm;    /* light may be looked for so far from surfaces; INFINITY: of a capture */
     double r_max_mm;   /* the farthest medium's                            */
     double r_max_px;   /* on the picture, at the nearest                   */
     double spacing_mm; /* the narrowest medium's                           */
@@ -258,7 +261,8 @@ struct render_plan {
     struct render_ball ball;
     struct render_projection camera;
     int width_px, height_px;
-    double pixel_mm; /* perspective: at distance 1                       */
+    double pixel_mm;       /* perspective: at distance 1                       */
+    double least_pixel_mm; /* on the nearest surface                           */
 
     struct render_decision decisions[RENDER_EFFECT_LIMIT];
     size_t effect_count;

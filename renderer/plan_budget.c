@@ -27,6 +27,10 @@
  * where epsilon of the lit is much, it is the one that counts. */
 #define GATHER_OWN_SHARE 4
 
+/* Where pixels are wide and light spreads little: what spreads no farther than a place is away from the
+ * surface does not arrive there. */
+#define FLAT_SHARE 0.1
+
 /* Caps of so many spacings keep the bands of splats under their share of epsilon = 0.01; for a tenth of
  * that, so many more are needed. */
 #define CAP_SPACINGS 8
@@ -63,6 +67,18 @@ static double tail(const dipole_stack *stack, double r_mm, double unused)
     return dipole_stack_beyond(stack, DIPOLE_FACE_LIT, r_mm) / dipole_stack_total(stack, DIPOLE_FACE_LIT);
 }
 
+/* Within which no more than that part of the light leaves, of the narrowest channel. */
+static double nearest_mm(const struct render_medium *medium, double part)
+{
+    double narrowest_mm = INFINITY;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (medium->diffuse_reflectance[c] > 0)
+            narrowest_mm =
+                fmin(narrowest_mm, dipole_stack_r_max_mm(medium->stacks[c], DIPOLE_FACE_LIT, 1 - part));
+    }
+    return narrowest_mm;
+}
+
 /* The narrowest channel's. */
 static double blurred_spacing_mm(const struct render_medium *medium, double epsilon, double least_mm)
 {
@@ -92,6 +108,8 @@ static void spend_on_medium(const struct render_request *request, struct render_
     struct render_plan_medium *const planned = &plan->of_medium[index];
     if (!planned->is_visible || !medium->has_scattering)
         return;
+    if (!request->is_captured)
+        plan->flat_mm = fmin(plan->flat_mm, nearest_mm(medium, FLAT_SHARE * plan->epsilon));
     planned->r_max_mm = render_medium_r_max_mm(medium, plan->truncation_epsilon);
     planned->table_error = plan->table_epsilon;
     if (request->tables) {
@@ -231,7 +249,7 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     plan->aliasing_epsilon = limit_or(limits->aliasing, ALIASING_SHARE * plan->epsilon);
     plan->banding_epsilon = BANDING_SHARE * plan->epsilon;
     plan->table_epsilon = fmax(limit_or(limits->table, TABLE_SHARE * plan->epsilon), LUT_EPSILON_MIN);
-    plan->spacing_mm = INFINITY;
+    plan->spacing_mm = plan->flat_mm = INFINITY;
     for (size_t m = 0; m < plan->media->count; m++)
         spend_on_medium(request, plan, m);
     space_objects(request, plan);
@@ -240,13 +258,14 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
         plan->spacing_mm =
             request->spacing_mm > 0 ? request->spacing_mm : 2 * plan->ball.radius_mm / SAMPLES_ACROSS;
     const struct render_projection *const camera = &plan->camera;
-    double nearest_mm = 1;
+    double depth_mm = 1;
     if (!camera->is_orthographic) {
         double centre_mm[3];
         render_projection_to_view(camera, plan->ball.centre_mm, centre_mm);
-        nearest_mm = fmax(sqrt(render_dot(centre_mm, centre_mm)) - plan->ball.radius_mm, camera->near_mm);
+        depth_mm = fmax(sqrt(render_dot(centre_mm, centre_mm)) - plan->ball.radius_mm, camera->near_mm);
     }
-    plan->r_max_px = plan->r_max_mm / (plan->pixel_mm * nearest_mm);
+    plan->least_pixel_mm = plan->pixel_mm * depth_mm;
+    plan->r_max_px = plan->r_max_mm / plan->least_pixel_mm;
 }
 
 void render_plan_spend_on_gathering(const struct render_request *request, struct render_plan *plan)
@@ -375,9 +394,12 @@ void render_plan_settle_spacing(const struct render_request *request, struct ren
         settle_medium(request, plan, m, texel_mm);
 }
 
-static double root_of_squares(double a, double b, double c, double d)
+static double root_of_squares(const double *errors, size_t count)
 {
-    return hypot(hypot(a, b), hypot(c, d));
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += errors[i] * errors[i];
+    return sqrt(sum);
 }
 
 void render_plan_predict_error(const struct render_request *request, struct render_plan *plan)
@@ -392,8 +414,8 @@ void render_plan_predict_error(const struct render_request *request, struct rend
         plan->aliasing_error = fmax(plan->aliasing_error, planned->aliasing_error);
         plan->blur_error = fmax(plan->blur_error, planned->blur_error);
         plan->table_error = fmax(plan->table_error, planned->table_error);
-        const double varying =
-            root_of_squares(planned->aliasing_error, planned->blur_error, plan->banding_error, 0);
+        const double varying = root_of_squares(
+            (double[]){ planned->aliasing_error, planned->blur_error, plan->banding_error }, 3);
         if (request->tables && planned->table_error + planned->truncation_error + varying > plan->epsilon)
             render_plan_add_note(plan,
                                  "the table of material \"%.60s\" was baked with epsilon %.3g: its part of "
@@ -402,7 +424,9 @@ void render_plan_predict_error(const struct render_request *request, struct rend
                                  planned->table_error + planned->truncation_error, plan->table_epsilon,
                                  plan->epsilon);
     }
-    plan->error_predicted = plan->truncation_error + plan->table_error +
-                            root_of_squares(plan->aliasing_error, plan->blur_error, plan->banding_error,
-                                            plan->environment_error);
+    plan->error_predicted =
+        plan->truncation_error + plan->table_error +
+        root_of_squares((double[]){ plan->aliasing_error, plan->blur_error, plan->banding_error,
+                                    plan->environment_error, plan->gloss_error },
+                        5);
 }

@@ -88,7 +88,9 @@ bool render_plan_light_from_around(const struct render_request *request, struct 
         return true;
     }
     const double share = (RENDER_ENVIRONMENT_SHARE - RENDER_IRRADIANCE_SHARE) * plan->epsilon;
-    const double epsilon = request->limits.environment > 0 ? request->limits.environment : share;
+    const double epsilon = request->limits.environment > 0 ? request->limits.environment
+                           : request->keeps_negligible     ? 0
+                                                           : share;
     plan->irradiance_tolerance = RENDER_IRRADIANCE_SHARE * plan->epsilon;
     plan->irradiance = calloc(plan->media->count, sizeof(struct render_irradiance *));
     if (!plan->irradiance)

@@ -25,6 +25,8 @@ void render_plan_forget_environment(struct render_plan *plan);
 
 /* plan_budget.c: share out epsilon; r_max, spacing and blur of each visible medium. Then, once the views
  * are known, their finest spacing tells what aliasing is left, and the bands can be laid out. */
+void render_plan_look_at_gloss(const struct render_request *request, struct render_plan *plan);
+
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan);
 void render_plan_spend_on_gathering(const struct render_request *request, struct render_plan *plan);
 void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan);

@@ -41,7 +41,10 @@ static void choose_view_size(const struct render_plan *plan, struct render_plan_
     const struct render_projection *const projection = &view->projection;
     const double width_mm =
         2 * projection->half_width * (projection->is_orthographic ? 1 : projection->far_mm);
-    const double cells = ceil(width_mm / (CELL_SHARE * plan->spacing_mm) * (1 - 1e-9));
+    /* shadows alone want no more than a picture shows of them */
+    const double spacing_mm =
+        render_plan_sums_samples(plan) ? plan->spacing_mm : fmax(plan->spacing_mm, plan->least_pixel_mm);
+    const double cells = ceil(width_mm / (CELL_SHARE * spacing_mm) * (1 - 1e-9));
     const int limit_px = side_limit_px(plan);
     const int cell_count = cells >= limit_px ? limit_px : cells < 1 ? 1 : (int)cells;
     const bool is_narrow = !projection->is_orthographic && !view->is_cube_face;

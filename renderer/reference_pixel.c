@@ -1,6 +1,7 @@
 #include "renderer/reference_pixel.h"
 
 #include "renderer/area_light.h"
+#include "renderer/gloss.h"
 #include "renderer/plan.h"
 
 #include <math.h>
@@ -149,17 +150,6 @@ void render_light_left(const struct render_tracer *tracer, const struct io_light
     }
 }
 
-/* f cosine of GGX with the height-correlated Smith term; alpha: roughness. specular.frag has the same. */
-static double ggx(double alpha, double cosine_normal_half, double cosine_in, double cosine_out)
-{
-    const double a2 = alpha * alpha;
-    const double d = 1 + cosine_normal_half * cosine_normal_half * (a2 - 1);
-    const double distribution = a2 / (PI * d * d);
-    const double smith_in = cosine_out * sqrt(a2 + (1 - a2) * cosine_in * cosine_in);
-    const double smith_out = cosine_in * sqrt(a2 + (1 - a2) * cosine_out * cosine_out);
-    return distribution * 0.5 * cosine_in / (smith_in + smith_out);
-}
-
 /* Mirrored part of the irradiance of a light, in 1/sr. */
 static double mirrored_per_sr(const struct render_pixel_view *view,
                               const struct render_surface_point *point, const double to_light[3])
@@ -175,8 +165,8 @@ static double mirrored_per_sr(const struct render_pixel_view *view,
     const double length = sqrt(render_dot(middle, middle));
     const double cosine_half = fmin(fmax(render_dot(to_light, middle) / length, 0), 1);
     return dipole_fresnel_reflectance(view->media[point->object].eta, cosine_half) *
-           ggx(view->scene->objects[point->object].roughness, render_dot(point->normal, middle) / length,
-               cosine_in, cosine_out);
+           render_ggx_per_sr(view->scene->objects[point->object].roughness,
+                             render_dot(point->normal, middle) / length, cosine_in, cosine_out);
 }
 
 static void add_mirrored(const struct render_pixel_view *view, const struct io_light *light,

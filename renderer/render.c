@@ -265,6 +265,7 @@ struct render_request render_request_for(const struct renderer *renderer,
         .environment_samples = options->environment_samples,
         .ambient_visibility = options->ambient_visibility,
         .is_tone_mapped = options->is_tone_mapped,
+        .keeps_negligible = options->keeps_negligible,
     };
 }
 

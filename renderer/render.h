@@ -197,6 +197,7 @@ struct render_options {
     struct render_shadow_options shadows;
     enum render_environment_samples environment_samples;
     int ambient_visibility; /* rays from each sample of the environment's light; 0: nothing hides it */
+    bool keeps_negligible;  /* draw also what changes nothing by more than epsilon, to see what it costs */
     bool is_tone_mapped;    /* 0..1 over the scene's background, for a PNG; else
                             linear radiance, premultiplied by coverage (alpha)  */
 
@@ -231,7 +232,7 @@ struct render_report {
     double budget_ms;       /* that epsilon was chosen for; 0: it was asked for */
     double predicted_ms;    /* of the whole picture; NAN: of the reference nothing is predicted */
     double error_predicted; /* of the reference estimated; INFINITY: not bounded; else what is cut off and
-                               the table's, and the root of the squares of the other four */
+                               the table's, and the root of the squares of the others */
     double truncation_error, table_error;
     double aliasing_error, blur_error, banding_error;
     double environment_error;    /* of the harmonics left out */

@@ -414,6 +414,8 @@ static void draw_batch(struct render_splatter *splatter, const struct render_fra
     render_bind_buffer(frame, "light_samples", UNIT_SAMPLES, &splatter->sample_buffer);
     render_bind_buffer(frame, "profile_table", UNIT_TABLE, &splatter->table_buffer);
     render_set_int(frame->program, "profile_last_node", RENDER_BAND_NODES - 1);
+    glProgramUniform2f(frame->program, glGetUniformLocation(frame->program, "pixel"),
+                       2.0F / (float)frame->plan->width_px, 2.0F / (float)frame->plan->height_px);
     glDeleteBuffers(1, &splatter->splat_buffer);
     glCreateBuffers(1, &splatter->splat_buffer);
     glNamedBufferStorage(splatter->splat_buffer,

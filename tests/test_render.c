@@ -254,6 +254,56 @@ static void all_flux_of_a_point_light_is_sampled(void **state)
     }
 }
 
+/* ---- wide pixels --------------------------------------------------------------------------------- */
+
+/* Oracle: Lambert's closed form on a ball whose pixels are 2.4 mm wide, over what light spreads by in a
+ * medium of which all but a thousandth leaves within 1 mm: whatever draws it looks for light on the
+ * surface, not where the middle of a pixel's points lies, up to 0.02 mm below, at most of the way that half
+ * of the light goes. */
+static void light_is_looked_for_on_the_surface(void **state)
+{
+    (void)state;
+    const enum render_technique techniques[] = { RENDER_TECHNIQUE_LAMBERT, RENDER_TECHNIQUE_GATHER,
+                                                 RENDER_TECHNIQUE_SPLAT };
+    const dipole_medium narrow = { .sigma_a_per_mm = 1.2, .sigma_s_prime_per_mm = 20, .eta = 1.3 };
+    const double radius_mm = 40, height_mm = 100;
+    struct io_material material = { .name = "narrow" };
+    struct test_scene test;
+    dipole_coefficients k;
+    assert_true(dipole_coefficients_init(&narrow, &k, NULL));
+    io_material_set_media(&material, (const dipole_medium[]){ narrow, narrow, narrow });
+    scene_init(&test, 200);
+    assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 64, radius_mm, 0, &material));
+    scene_add_directional(&test, 0, 0, -1, 3);
+    test.scene.camera.is_orthographic = true;
+    test.scene.camera.height_mm = height_mm;
+    test.scene.camera.width_px = 56;
+    test.scene.camera.height_px = 42;
+    struct renderer *const renderer = renderer_of(&test, RENDER_CONTEXT_DEFAULT);
+    for (int t = 0; t < 3; t++) {
+        const struct render_options drawing = { .technique = techniques[t], .epsilon = 0.1 };
+        struct io_image *const image = draw(renderer, &drawing, NULL);
+        struct deviation deviation = { 0 };
+        for (int i = 0; i < 56 * 42; i++) {
+            const double x_mm = (i % 56 - 27.5) * height_mm / 42, y_mm = (i / 56 - 20.5) * height_mm / 42;
+            const double off = hypot(x_mm, y_mm) / radius_mm, cosine = sqrt(fmax(1 - off * off, 0));
+            const double through = 1 - dipole_fresnel_reflectance(1.3, cosine);
+            if (off < 0.8)
+                deviation_add(&deviation, (double)image->pixels[4 * i],
+                              3 * cosine * through * dipole_diffuse_reflectance(&k) * through /
+                                  (PI * dipole_fdt_outside(1.3)));
+        }
+        print_message("  %s: relative RMSE %.4f, worst %.4f of the brightest\n",
+                      render_technique_names[techniques[t]], relative_rmse(&deviation),
+                      deviation.worst / deviation.peak);
+        assert_true(relative_rmse(&deviation) <= 0.03);
+        assert_true(deviation.worst <= 0.1 * deviation.peak);
+        io_image_destroy(image);
+    }
+    render_destroy(renderer);
+    scene_end(&test);
+}
+
 /* ---- lambert, specular, composite --------------------------------------------------------------- */
 
 /* A slab seen and lit from straight above. */
@@ -689,6 +739,7 @@ int main(void)
         cmocka_unit_test(splats_approach_the_surface_integral),
         cmocka_unit_test(energy_is_conserved),
         cmocka_unit_test(all_flux_of_a_point_light_is_sampled),
+        cmocka_unit_test(light_is_looked_for_on_the_surface),
         cmocka_unit_test(lambert_is_the_closed_form_on_a_flat_face),
         cmocka_unit_test(specular_is_ggx_and_has_shadows),
         cmocka_unit_test(coverage_is_the_area_of_the_silhouette),

@@ -8,10 +8,13 @@
 static struct render_decision decide(const struct render_request *request, const struct render_plan *plan)
 {
     (void)request;
-    if (!plan->has_specular)
+    if (!plan->is_glossy)
         return render_not_called_for("no object is glossy");
     if (plan->lit_count == 0)
         return render_not_called_for("no light shines");
+    if (!plan->has_specular)
+        return render_not_called_for("gloss adds at most %.2g of what a lit surface sends out",
+                                     plan->gloss_most);
     return render_called_for("an object is glossy");
 }
 

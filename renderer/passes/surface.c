@@ -39,6 +39,7 @@ static void bind_depth(const struct render_frame *frame)
 
 static void bind_resolve(const struct render_frame *frame)
 {
+    render_set_float(frame->program, "flat_mm", frame->plan->flat_mm);
     render_set_float(frame->program, "gloss_spread", frame->request->is_captured ? 0 : GLOSS_SPREAD);
     render_set_points(frame);
     render_set_medium(frame->program, frame->plan);

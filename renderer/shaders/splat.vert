@@ -10,11 +10,13 @@ flat out ivec2 samples_of_splat;
 flat out vec4 ball_of_splat;
 flat out vec4 profile_of_splat;
 flat out float object_of_splat;
+uniform vec2 pixel;  // size, of what is 2 wide
 
 void main()
 {
     vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-    gl_Position = vec4(mix(rectangle.xy, rectangle.zw, corner), 2.0 * depth - 1.0, 1.0);
+    // light is looked for anywhere in a pixel, not in its middle alone
+    gl_Position = vec4(mix(rectangle.xy - pixel, rectangle.zw + pixel, corner), 2.0 * depth - 1.0, 1.0);
     samples_of_splat = ivec2(range);
     ball_of_splat = ball;
     profile_of_splat = profile;
