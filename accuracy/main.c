@@ -203,7 +203,8 @@ int main(int argc, char **argv)
           .kind = CLI_NUMBER,
           .target = &options.repeat_count,
           .argument = "N",
-          .help = "Pictures that are timed for each point, 1 to 32, default 5.",
+          .help = "Pictures that are timed for each point, 1 to 32, default 5; two "
+                  "where one takes over 3 s.",
           .min = 1,
           .max = ACCURACY_REPEAT_LIMIT },
         { .name = "quick",

@@ -18,6 +18,10 @@
 /* For each channel of a material, of the physics ladder. */
 enum { LADDER_PHOTONS = 1000000 };
 
+/* Pictures that take so long are hardly disturbed, and are drawn fewer times. */
+#define SLOW_MS 3000.0
+enum { SLOW_REPEATS = 2 };
+
 /* A fit takes a second. */
 enum { FIT_REPEATS = 3 };
 
@@ -195,12 +199,18 @@ static bool draw_reference(struct accuracy_sweep *sweep, const char *path,
     return io_exr_write(path, sweep->reference, false, status);
 }
 
+static bool is_timed(const struct accuracy_sweep *sweep, const struct accuracy_point *point)
+{
+    const bool is_slow = point->time_count >= SLOW_REPEATS && point->time_ms.median > SLOW_MS;
+    return is_slow || point->time_count >= (size_t)sweep->repeat_count;
+}
+
 bool accuracy_sweep_is_complete(const struct accuracy_sweep *sweep)
 {
     for (size_t i = 0; i < sweep->point_count; i++) {
         if (sweep->points[i].refusal[0])
             continue;
-        if (!sweep->points[i].is_drawn || sweep->points[i].time_count < (size_t)sweep->repeat_count)
+        if (!sweep->points[i].is_drawn || !is_timed(sweep, &sweep->points[i]))
             return false;
     }
     return true;
@@ -223,7 +233,8 @@ bool accuracy_sweep_run(struct accuracy_sweep *sweep, const char *folder, const 
     for (int round = 0; round <= sweep->repeat_count; round++) {
         for (size_t i = 0; i < sweep->point_count; i++, step++) {
             struct accuracy_point *const point = &sweep->points[i];
-            const bool is_done = round == 0 ? point->picture != NULL : point->time_count >= (size_t)round;
+            const bool is_done = round == 0 ? point->picture != NULL
+                                            : point->time_count >= (size_t)round || is_timed(sweep, point);
             if (*stop)
                 return true;
             if (progress->show)

@@ -347,8 +347,8 @@ bool fit_picture_is_fine(struct fit_picture *picture, dipole_stack *const stacks
     for (int c = 0; c < FIT_CHANNEL_COUNT; c++) {
         if (!stacks[c])
             continue;
-        error = fmax(error, render_footprint_error(stacks[c], blur_mm));
-        while (render_footprint_error(stacks[c], blur_share * wanted_mm) > blur_error_aim &&
+        error = fmax(error, render_footprint_error(stacks[c], blur_mm, 0));
+        while (render_footprint_error(stacks[c], blur_share * wanted_mm, 0) > blur_error_aim &&
                wanted_mm > 1e-3 * picture->spacing_mm)
             wanted_mm *= 0.9;
     }

@@ -43,16 +43,18 @@ double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, do
 /*
  * The response to an edge at 0 is 1/2 + (1/pi) int spectrum(k) sin(kx)/k dk, and so differs by at most
  * (1/pi) int spectrum(k) (1 - blur(k))/k dk: the trapezoidal rule in log k, over which the integrand rises
- * as k^6 and falls with the spectrum.
+ * as k^6 and falls with the spectrum. A mean over w leaves |sin(kw/2)/(kw/2)| of each wave, at most 2/(kw).
  */
-double render_footprint_error(const dipole_stack *stack, double blur_mm)
+double render_footprint_error(const dipole_stack *stack, double blur_mm, double pixel_mm)
 {
     const double step = log(2) / SPECTRUM_STEPS;
     double sum = 0;
     for (int i = -4 * SPECTRUM_STEPS; i <= 20 * SPECTRUM_STEPS; i++) {
         const double x = exp(i * step);
         const double lost = -expm1(-0.5 * x * x);
-        const double term = lost * lost * lost * dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, x / blur_mm);
+        const double k_per_mm = x / blur_mm, seen = fmin(2 / (k_per_mm * pixel_mm), 1);
+        const double term =
+            seen * lost * lost * lost * dipole_stack_spectrum(stack, DIPOLE_FACE_LIT, k_per_mm);
         sum += term;
         if (i > 0 && term < 1e-6 * sum)
             break;
@@ -60,12 +62,13 @@ double render_footprint_error(const dipole_stack *stack, double blur_mm)
     return sum * step / PI / dipole_stack_total(stack, DIPOLE_FACE_LIT);
 }
 
-double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm)
+double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm,
+                                   double pixel_mm)
 {
     double high_mm = least_mm;
     for (int i = 0; i < 40; i++) {
         const double blur_mm = render_footprint_blur_mm(stack, 2 * high_mm, epsilon);
-        if (blur_mm > 0 && render_footprint_error(stack, blur_mm) > epsilon)
+        if (blur_mm > 0 && render_footprint_error(stack, blur_mm, pixel_mm) > epsilon)
             break;
         high_mm *= 2;
     }
@@ -74,7 +77,7 @@ double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, do
     while (high_mm > 1.02 * low_mm) {
         const double middle_mm = sqrt(low_mm * high_mm);
         const double blur_mm = render_footprint_blur_mm(stack, middle_mm, epsilon);
-        if (blur_mm > 0 && render_footprint_error(stack, blur_mm) > epsilon)
+        if (blur_mm > 0 && render_footprint_error(stack, blur_mm, pixel_mm) > epsilon)
             high_mm = middle_mm;
         else
             low_mm = middle_mm;

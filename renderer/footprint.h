@@ -33,15 +33,16 @@ double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, d
 /* The blur that keeps aliasing at epsilon; 0 where it is less without. */
 double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double epsilon);
 
-/* What the blur changes at the edge of a shadow on a flat surface, at most, as part of the lit radiosity.
- */
-double render_footprint_error(const dipole_stack *stack, double blur_mm);
+/* What the blur changes at the edge of a shadow on a flat surface, at most, as part of the lit radiosity:
+ * of means over pixel_mm, or with 0 at any point. */
+double render_footprint_error(const dipole_stack *stack, double blur_mm, double pixel_mm);
 
 /* Beyond so many times the blur lies less than 2e-6 of what is averaged: e^(-r^2/(6 b^2)). */
 #define RENDER_FOOTPRINT_REACH 9
 
 /* The spacing at which aliasing and error of the blur are epsilon each; not less than least_mm. */
-double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm);
+double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm,
+                                   double pixel_mm);
 
 /* Averaged profile of the lit face, tabulated out to reach_mm. One allocation; end it with free. */
 struct render_footprint {

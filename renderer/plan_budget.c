@@ -80,13 +80,14 @@ static double nearest_mm(const struct render_medium *medium, double part)
 }
 
 /* The narrowest channel's. */
-static double blurred_spacing_mm(const struct render_medium *medium, double epsilon, double least_mm)
+static double blurred_spacing_mm(const struct render_plan *plan, const struct render_medium *medium,
+                                 double epsilon, double least_mm)
 {
     double narrowest_mm = INFINITY;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (medium->diffuse_reflectance[c] > 0)
-            narrowest_mm =
-                fmin(narrowest_mm, render_footprint_spacing_mm(medium->stacks[c], epsilon, least_mm));
+            narrowest_mm = fmin(narrowest_mm, render_footprint_spacing_mm(medium->stacks[c], epsilon,
+                                                                          least_mm, plan->least_pixel_mm));
     }
     return narrowest_mm;
 }
@@ -98,7 +99,7 @@ static double sampled_spacing_mm(const struct render_plan *plan, const struct re
     const double sharp_mm = render_medium_spacing_mm(medium, plan->aliasing_epsilon);
     if (sharp_mm >= widest_mm)
         return widest_mm;
-    const double blurred_mm = blurred_spacing_mm(medium, 0.5 * plan->aliasing_epsilon, sharp_mm);
+    const double blurred_mm = blurred_spacing_mm(plan, medium, 0.5 * plan->aliasing_epsilon, sharp_mm);
     return fmin(blurred_mm > BLUR_GAIN * sharp_mm ? blurred_mm : sharp_mm, widest_mm);
 }
 
@@ -237,6 +238,18 @@ static void limit_samples(const struct render_request *request, struct render_pl
     plan->spacing_mm = least_mm;
 }
 
+/* Of the nearest surface there may be. */
+static double least_pixel_mm(const struct render_plan *plan)
+{
+    const struct render_projection *const camera = &plan->camera;
+    if (camera->is_orthographic)
+        return plan->pixel_mm;
+    double centre_mm[3];
+    render_projection_to_view(camera, plan->ball.centre_mm, centre_mm);
+    return plan->pixel_mm *
+           fmax(sqrt(render_dot(centre_mm, centre_mm)) - plan->ball.radius_mm, camera->near_mm);
+}
+
 static double limit_or(double limit, double share)
 {
     return limit > 0 ? limit : share;
@@ -245,6 +258,7 @@ static double limit_or(double limit, double share)
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan)
 {
     const struct render_limits *const limits = &request->limits;
+    plan->least_pixel_mm = least_pixel_mm(plan);
     plan->truncation_epsilon = limit_or(limits->truncation, TRUNCATION_SHARE * plan->epsilon);
     plan->aliasing_epsilon = limit_or(limits->aliasing, ALIASING_SHARE * plan->epsilon);
     plan->banding_epsilon = BANDING_SHARE * plan->epsilon;
@@ -257,14 +271,6 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     if (isinf(plan->spacing_mm)) /* nothing scatters */
         plan->spacing_mm =
             request->spacing_mm > 0 ? request->spacing_mm : 2 * plan->ball.radius_mm / SAMPLES_ACROSS;
-    const struct render_projection *const camera = &plan->camera;
-    double depth_mm = 1;
-    if (!camera->is_orthographic) {
-        double centre_mm[3];
-        render_projection_to_view(camera, plan->ball.centre_mm, centre_mm);
-        depth_mm = fmax(sqrt(render_dot(centre_mm, centre_mm)) - plan->ball.radius_mm, camera->near_mm);
-    }
-    plan->least_pixel_mm = plan->pixel_mm * depth_mm;
     plan->r_max_px = plan->r_max_mm / plan->least_pixel_mm;
 }
 
@@ -294,7 +300,8 @@ static void blur_channels(const struct render_plan *plan, const struct render_me
                                        render_footprint_aliasing(stack, spacing_mm, planned->blur_mm[c]));
         if (planned->blur_mm[c] > 0)
             planned->blur_error =
-                fmax(planned->blur_error, render_footprint_error(stack, planned->blur_mm[c]));
+                fmax(planned->blur_error,
+                     render_footprint_error(stack, planned->blur_mm[c], plan->least_pixel_mm));
     }
 }
 

@@ -114,7 +114,7 @@ bool render_plan_light_from_around(const struct render_request *request, struct 
             "the environment is drawn to order %d: what is above adds up to %.2g of its mean, "
             "%.2g were asked",
             plan->environment_order, plan->environment_error, asked);
-    if (plan->has_specular)
+    if (plan->is_glossy)
         render_plan_add_note(plan, "gloss does not mirror the environment");
     if (render_plan_sums_samples(plan) && request->environment_samples != RENDER_ENVIRONMENT_SURFACE)
         choose_peel_size(request, plan);

@@ -261,6 +261,8 @@ static void the_error_budget_is_kept(void **state)
     const struct io_material material = skin1();
     scene_init(&test, 400);
     assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 32, 80, 0, &material));
+    test.scene.camera.width_px = 3200; /* so fine that a blur would be seen */
+    test.scene.camera.height_px = 2400;
     scene_add_directional(&test, -1, -1, -1, 3);
     const double epsilons[] = { 0.1, 0.01, 0.001, 1e-4 };
     for (int i = 0; i < 4; i++) {
@@ -412,6 +414,7 @@ static void a_light_view_that_is_too_coarse_is_told(void **state)
     const struct io_material material = marble();
     scene_init(&test, 5000);
     assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 1000, 0, &material));
+    test.scene.camera.fov_y_rad = 0.005; /* a blur would be seen */
     scene_add_directional(&test, 0, 0, -1, 3);
     struct render_request request = request_for(&test);
     request.technique = RENDER_TECHNIQUE_SPLAT;
