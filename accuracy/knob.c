@@ -82,8 +82,8 @@ static bool are_alike(const struct render_plan *a, const struct render_plan *b)
 /* Whether the automatic choice leaves something out since it changes nothing by more than epsilon. */
 static bool leaves_out(const struct accuracy_subject *subject, double epsilon)
 {
-    struct render_plan *const least = plan_of(subject, epsilon, false), *const all =
-                                                                            plan_of(subject, epsilon, true);
+    struct render_plan *const least = plan_of(subject, epsilon, false);
+    struct render_plan *const all = plan_of(subject, epsilon, true);
     const bool does = least && all && !are_alike(least, all);
     render_plan_destroy(least);
     render_plan_destroy(all);
