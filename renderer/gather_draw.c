@@ -88,11 +88,11 @@ static void sort_object(void *context, int index)
     all->statuses[o].code = DIPOLE_OK;
     if (!all->objects[o].medium)
         return;
+    const struct render_light_sample *const samples = all->samples ? all->samples + all->first[o] : NULL;
     const uint64_t *const codes = all->codes ? all->codes + all->first[o] : NULL;
-    if (!render_gather_sources_init(all->samples + all->first[o], codes, all->code_levels[o],
-                                    all->first[o + 1] - all->first[o], all->media[o]->bands,
-                                    all->media[o]->band_count, all->media[o]->spread_mm, &all->sources[o],
-                                    &all->statuses[o]))
+    if (!render_gather_sources_init(samples, codes, all->code_levels[o], all->first[o + 1] - all->first[o],
+                                    all->media[o]->bands, all->media[o]->band_count,
+                                    all->media[o]->spread_mm, &all->sources[o], &all->statuses[o]))
         return;
     all->objects[o].sources = &all->sources[o];
 }
