@@ -4,11 +4,6 @@
 
 #include "renderer/gloss.h"
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* A normal near the half vector, z, or anywhere. */
 static void random_normal(struct rng *rng, double normal[3])
 {
@@ -16,7 +11,7 @@ static void random_normal(struct rng *rng, double normal[3])
     normal[0] = reach * uniform(rng, -1, 1);
     normal[1] = reach * uniform(rng, -1, 1);
     normal[2] = 1;
-    const double length = sqrt(dot(normal, normal));
+    const double length = sqrt(render_dot(normal, normal));
     for (int k = 0; k < 3; k++)
         normal[k] /= length;
 }
@@ -38,11 +33,11 @@ static void no_normal_mirrors_more(void **state)
             const double to_eye[3] = { -to_light[0], 0, to_light[2] };
             double normal[3];
             random_normal(&rng, normal);
-            if (dot(normal, to_light) <= 0 || dot(normal, to_eye) <= 0)
+            if (render_dot(normal, to_light) <= 0 || render_dot(normal, to_eye) <= 0)
                 continue;
-            const double mirrored =
-                dipole_fresnel_reflectance(eta, to_light[2]) *
-                render_ggx_per_sr(roughness, normal[2], dot(normal, to_light), dot(normal, to_eye));
+            const double mirrored = dipole_fresnel_reflectance(eta, to_light[2]) *
+                                    render_ggx_per_sr(roughness, normal[2], render_dot(normal, to_light),
+                                                      render_dot(normal, to_eye));
             most = fmax(most, mirrored);
         }
         if (!(most <= 1.01 * bound && most >= 0.5 * bound))
@@ -133,7 +128,7 @@ static void what_is_left_out_is_not_seen(void **state)
 }
 
 /* Oracle: Fresnel's equations. Without a step of the index nothing is mirrored, whatever is asked; where
- * nothing scatters, or a picture is captured, gloss is all that there is. */
+ * nothing scatters, or a picture is captured, gloss is all that there is; and it can be asked for. */
 static void gloss_is_drawn_where_it_counts(void **state)
 {
     (void)state;
@@ -152,6 +147,11 @@ static void gloss_is_drawn_where_it_counts(void **state)
     plan = plan_for(&request);
     assert_false(decision_of(plan, "specular")->is_active);
     render_plan_destroy(plan);
+    request.keeps_negligible = true;
+    plan = plan_for(&request);
+    assert_true(decision_of(plan, "specular")->is_active && plan->gloss_error == 0);
+    render_plan_destroy(plan);
+    request.keeps_negligible = false;
     request.is_captured = true;
     plan = plan_for(&request);
     assert_true(decision_of(plan, "specular")->is_active);

@@ -364,12 +364,41 @@ static void auto_takes_lambert_when_scattering_is_under_a_pixel(void **state)
     struct render_plan *far_plan = plan_for(&request);
     assert_true(far_plan->r_max_px < 1);
     assert_int_equal(far_plan->technique, RENDER_TECHNIQUE_LAMBERT);
+    request.keeps_negligible = true;
+    struct render_plan *kept_plan = plan_for(&request);
+    assert_int_equal(kept_plan->technique, RENDER_TECHNIQUE_GATHER);
+    render_plan_destroy(kept_plan);
+    request.keeps_negligible = false;
     request.technique = RENDER_TECHNIQUE_SPLAT;
     struct render_plan *asked_plan = plan_for(&request);
     assert_int_equal(asked_plan->technique, RENDER_TECHNIQUE_SPLAT);
     render_plan_destroy(near_plan);
     render_plan_destroy(far_plan);
     render_plan_destroy(asked_plan);
+    scene_end(&test);
+}
+
+/* Oracle: the definition. Samples 0.1 mm apart want more texels than the least, shadows that pixels 2 mm
+ * wide show do not. */
+static void views_for_shadows_are_as_fine_as_the_picture(void **state)
+{
+    (void)state;
+    const dipole_medium narrow = { .sigma_a_per_mm = 1.2, .sigma_s_prime_per_mm = 20, .eta = 1.3 };
+    struct io_material material = { .name = "narrow" };
+    struct test_scene test;
+    io_material_set_media(&material, (const dipole_medium[]){ narrow, narrow, narrow });
+    scene_init(&test, 200);
+    assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 32, 40, 0, &material));
+    scene_add_directional(&test, 0, 0, -1, 3);
+    struct render_request request = request_for(&test);
+    request.technique = RENDER_TECHNIQUE_LAMBERT;
+    struct render_plan *const lambert_plan = plan_for(&request);
+    request.technique = RENDER_TECHNIQUE_GATHER;
+    struct render_plan *const gather_plan = plan_for(&request);
+    assert_true(lambert_plan->views[0].size_px < 1024);
+    assert_true(gather_plan->views[0].size_px > 2048);
+    render_plan_destroy(lambert_plan);
+    render_plan_destroy(gather_plan);
     scene_end(&test);
 }
 
@@ -670,6 +699,7 @@ int main(void)
         cmocka_unit_test(the_error_budget_is_kept),
         cmocka_unit_test(a_budget_buys_the_least_error_within_it),
         cmocka_unit_test(auto_takes_lambert_when_scattering_is_under_a_pixel),
+        cmocka_unit_test(views_for_shadows_are_as_fine_as_the_picture),
         cmocka_unit_test(texels_of_views_follow_need),
         cmocka_unit_test(a_light_view_that_is_too_coarse_is_told),
         cmocka_unit_test(the_callers_table_counts),
