@@ -71,14 +71,19 @@ static inline void run_script(const char *path, const char *text, const char *si
 {
     char command[512];
     write_file(path, text);
-    /* each from a display number of its own: two that look for a free one at once find the same */
+    /* Each from a display number of its own: two that look for a free one at once find the same. Without
+     * -noreset the server starts anew when the first xdotool leaves, and refuses the window meanwhile. */
     snprintf(command, sizeof command,
-             "RENDER=" PROGRAM_FOLDER "/render xvfb-run -a -n $((100 + $$ %% 900)) -s '-screen 0 %sx24' "
+             "RENDER=" PROGRAM_FOLDER
+             "/render xvfb-run -a -n $((100 + $$ %% 900)) -s '-noreset -screen 0 %sx24' "
              "sh %s >%s.log 2>&1",
              size, path, path);
     const int code = system(command);
-    if (code != 0)
-        print_error("%s ended with %d: see %s.log\n", path, WEXITSTATUS(code), path);
+    if (code != 0) {
+        print_error("%s ended with %d and printed:\n", path, WEXITSTATUS(code));
+        snprintf(command, sizeof command, "cat %s.log >&2", path);
+        (void)!system(command);
+    }
     assert_int_equal(code, 0);
 }
 
