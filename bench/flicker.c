@@ -204,6 +204,7 @@ static bool run(struct bench *bench, enum render_technique technique, enum rende
                 bench->frame_count;
             for (size_t e = 0; e < plan->effect_count; e++) {
                 if (strcmp(render_effects[e]->name, "light_view") == 0 ||
+                    strcmp(render_effects[e]->name, "light_picture") == 0 ||
                     strcmp(render_effects[e]->name, "light_samples") == 0)
                     series->ms += time_ms[e] / bench->frame_count;
             }

@@ -26,11 +26,15 @@
 #define RENDER_COST_VIEW_TEXEL 0.5     /* of a light's view, cleared                   */
 #define RENDER_COST_LIT_TEXEL 17.0     /* the same, drawn                              */
 #define RENDER_COST_REST_TEXEL 9.0     /* and where it is at rest                      */
-#define RENDER_COST_READ_TEXEL 8.5     /* of the view, read back and put into samples  */
-#define RENDER_COST_TOLD_TEXEL 7.0     /* and told apart by its object                 */
-#define RENDER_COST_CELL_TEXEL 35.0    /* and looked up among cubes at rest            */
+#define RENDER_COST_SAMPLED_TEXEL 6.5  /* of the view, put into samples                */
+#define RENDER_COST_TOLD_TEXEL 3.0     /* and told apart by its object                 */
+#define RENDER_COST_CELL_TEXEL 11.0    /* and sorted into cubes at rest                */
+#define RENDER_COST_READ_TEXEL 2.0     /* and read back: each texture of them          */
 #define RENDER_COST_PICTURE_TEXEL 12.0 /* of one drawn in memory, and the same    */
 #define RENDER_COST_PICTURE_TRIANGLE 30.0
+#define RENDER_COST_WHOLE_TEXEL 7.0       /* of a whole one, kept and taken to OpenGL */
+#define RENDER_COST_DRAWN_TEXEL 12.0      /* the same, where it shows an object       */
+#define RENDER_COST_DRAWN_REST 6.0        /* and where it is at rest                  */
 #define RENDER_COST_SHADOW_PIXEL 100.0    /* covered, lit and shaded at one point         */
 #define RENDER_COST_GLOSS_PIXEL 260.0     /* the same, some at four                       */
 #define RENDER_COST_COMPOSITE_PIXEL 45.0  /* covered                                      */

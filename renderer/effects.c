@@ -13,6 +13,7 @@ const struct render_effect *const render_effects[] = {
     &render_effect_shadow,
     &render_effect_light_layers,
     &render_effect_light_view,
+    &render_effect_light_picture,
     &render_effect_light_shadow,
     &render_effect_coherence,
     &render_effect_light_samples,

@@ -10,6 +10,7 @@ extern const struct render_effect render_effect_surface;
 extern const struct render_effect render_effect_object_ids;
 extern const struct render_effect render_effect_light_layers;
 extern const struct render_effect render_effect_light_view;
+extern const struct render_effect render_effect_light_picture;
 extern const struct render_effect render_effect_shadow_map;
 extern const struct render_effect render_effect_avsm_colour;
 extern const struct render_effect render_effect_avsm;

@@ -3,6 +3,7 @@
 #include "renderer/environment_draw.h"
 #include "renderer/gather_draw.h"
 #include "renderer/geometry.h"
+#include "renderer/light_draw.h"
 #include "renderer/pose.h"
 #include "renderer/shadow_draw.h"
 #include "renderer/solid.h"
@@ -62,6 +63,7 @@ struct render_executor {
     struct texture textures[TEXTURE_LIMIT];
     size_t texture_count;
     size_t draw_counts[RENDER_EFFECT_LIMIT];
+    struct render_light_drawing *drawing;       /* NULL until a light's view is first kept in memory */
     struct render_splatter *splatter;           /* NULL until light is first sampled */
     struct render_gatherer *gatherer;           /* NULL until light is first gathered */
     struct render_tsm *tsm;                     /* NULL until a shadow map is first gathered */
@@ -223,6 +225,7 @@ void render_executor_destroy(struct render_executor *executor)
         glDeleteProgram(executor->programs[i].handle);
     for (size_t i = 0; i < executor->texture_count; i++)
         texture_end(&executor->textures[i]);
+    render_light_drawing_destroy(executor->drawing);
     render_splatter_destroy(executor->splatter);
     render_gatherer_destroy(executor->gatherer);
     render_tsm_destroy(executor->tsm);
@@ -451,6 +454,16 @@ void render_executor_hand_on(struct render_executor *executor, const char *textu
 
 /* ---- what is kept between frames ---------------------------------------------------------------- */
 
+bool render_executor_need_drawing(const struct render_frame *frame,
+                                  struct render_light_drawing **drawing_out, dipole_status *status)
+{
+    struct render_executor *const executor = frame->executor;
+    if (!executor->drawing && !(executor->drawing = render_light_drawing_create()))
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for what lights see");
+    *drawing_out = executor->drawing;
+    return true;
+}
+
 bool render_executor_need_splatter(const struct render_frame *frame, struct render_splatter **splatter_out,
                                    dipole_status *status)
 {
@@ -514,6 +527,11 @@ struct render_sky *render_executor_sky(const struct render_executor *executor)
 struct render_tsm *render_executor_tsm(const struct render_executor *executor)
 {
     return executor->tsm;
+}
+
+const struct render_light_drawing *render_executor_drawing(const struct render_executor *executor)
+{
+    return executor->drawing;
 }
 
 struct render_splatter *render_executor_splatter(const struct render_executor *executor)
@@ -628,8 +646,7 @@ static void bind_textures(const struct render_frame *frame, const struct render_
     }
 }
 
-/* Where no surface is, a light sees one infinitely far away: nothing there casts a shadow. */
-static void far_point(const struct render_plan_view *view, float value[4])
+void render_far_point(const struct render_plan_view *view, float value[4])
 {
     for (int k = 0; k < 3; k++)
         value[k] = (float)(view->projection.eye_mm[k] +
@@ -664,7 +681,7 @@ static bool attach_targets(const struct render_frame *frame, const struct render
         const GLuint nothing[4] = { 0, 0, 0, 0 };
         float value[4] = { 0, 0, 0, 0 };
         if (target->kind->is_far_where_empty && frame->view)
-            far_point(frame->view, value);
+            render_far_point(frame->view, value);
         if (target->kind->format == RENDER_R32UI)
             glClearNamedFramebufferuiv(framebuffer, GL_COLOR, (GLint)w, nothing);
         else if (target->kind->format != RENDER_OTHER && (!pass->is_added || !target->is_written))

@@ -6,6 +6,7 @@
 #include "renderer/plan.h"
 
 struct render_executor;
+struct render_light_drawing;
 struct render_splatter;
 struct render_gatherer;
 struct render_sky;
@@ -58,6 +59,9 @@ GLuint render_executor_texture(const struct render_executor *executor, const cha
 size_t render_executor_program_count(const struct render_executor *executor);
 size_t render_executor_draw_count(const struct render_executor *executor, size_t effect);
 
+/* The light's view that was drawn in memory last; NULL before a plan that keeps one has run. */
+const struct render_light_drawing *render_executor_drawing(const struct render_executor *executor);
+
 /* The state of the splats; NULL before a plan that needs light samples has run. */
 struct render_splatter *render_executor_splatter(const struct render_executor *executor);
 
@@ -93,7 +97,13 @@ void render_bind_buffer(const struct render_frame *frame, const char *name, int 
 /* The texture (RENDER_OTHER) that passes read by that name from now on; its maker ends it. */
 void render_executor_hand_on(struct render_executor *executor, const char *texture, GLuint handle);
 
+/* Where a light's view shows no surface it shows one infinitely far away: nothing there casts a shadow. */
+void render_far_point(const struct render_plan_view *view, float value[4]);
+
 /* Make what is kept between frames, when it is first needed. */
+DIPOLE_CHECKED bool render_executor_need_drawing(const struct render_frame *frame,
+                                                 struct render_light_drawing **drawing_out,
+                                                 dipole_status *status);
 DIPOLE_CHECKED bool render_executor_need_splatter(const struct render_frame *frame,
                                                   struct render_splatter **splatter_out,
                                                   dipole_status *status);

@@ -42,7 +42,7 @@ static const struct box no_box = { .low = 0, .high = -1 }, to_be_clipped = { .lo
 /* A triangle that is left of a clipped one. */
 struct piece {
     struct corner corners[3];
-    float position_mm[3][3], normal[3][3];
+    float position_mm[3][3], normal[3][3], rest_mm[3][3];
     uint32_t mesh;
     struct box box;
 };
@@ -257,6 +257,8 @@ static bool add_pieces(struct render_light_tiles *tiles, size_t mesh, size_t tri
             piece->corners[k] = perspective_corner(picture->projection, picture->size_px, at->in_view_mm);
             interpolate(of->mesh->positions, index, at->weights, piece->position_mm[k]);
             interpolate(of->mesh->normals, index, at->weights, piece->normal[k]);
+            if (of->rest_mm)
+                interpolate(of->rest_mm, index, at->weights, piece->rest_mm[k]);
         }
         piece->box = box_of(&piece->corners[0], &piece->corners[1], &piece->corners[2], picture->size_px,
                             of->has_hidden_inside);
@@ -355,7 +357,7 @@ static struct edge edge_of(const struct corner *a, const struct corner *b, int32
 
 struct triangle {
     const struct corner *corners[3];
-    const float *position_mm[3], *normal[3];
+    const float *position_mm[3], *normal[3], *rest_mm[3]; /* rest: NULL where not asked for */
     size_t mesh;
 };
 
@@ -370,12 +372,15 @@ static struct triangle triangle_of(const struct render_light_tiles *tiles, const
             triangle.corners[i] = &piece->corners[i];
             triangle.position_mm[i] = piece->position_mm[i];
             triangle.normal[i] = piece->normal[i];
+            triangle.rest_mm[i] = picture->meshes[piece->mesh].rest_mm ? piece->rest_mm[i] : NULL;
         }
         return triangle;
     }
     const struct io_mesh *const mesh = picture->meshes[entry->mesh].mesh;
+    const float *const rest_mm = picture->meshes[entry->mesh].rest_mm;
     const uint32_t *const index = &mesh->indices[3 * (size_t)entry->triangle];
     for (int i = 0; i < 3; i++) {
+        triangle.rest_mm[i] = rest_mm ? &rest_mm[3 * (size_t)index[i]] : NULL;
         triangle.corners[i] = &tiles->corners[tiles->first_corner[entry->mesh] + index[i]];
         triangle.position_mm[i] = &mesh->positions[3 * (size_t)index[i]];
         triangle.normal[i] = &mesh->normals[3 * (size_t)index[i]];
@@ -429,10 +434,10 @@ static void draw_triangle(const struct render_light_tiles *tiles, const struct e
     }
 }
 
-/* What is interpolated over a triangle: position and normal of its first corner, and steps to the others.
- */
+/* What is interpolated over a triangle: position, normal and place at rest of its first corner, and steps
+ * to the others. */
 struct surface {
-    float position_mm[3][3], normal[3][3];
+    float position_mm[3][3], normal[3][3], rest_mm[3][3];
     float order_b, order_c; /* perspective: what turns weights in the picture into those on the surface */
     float eta, size;        /* of a texel; 0: seen from behind */
     float object;
@@ -448,6 +453,8 @@ static void find_surface(const struct render_light_tiles *tiles, const struct en
             surface->position_mm[i][k] =
                 triangle.position_mm[i][k] - (i > 0 ? triangle.position_mm[0][k] : 0);
             surface->normal[i][k] = triangle.normal[i][k] - (i > 0 ? triangle.normal[0][k] : 0);
+            if (triangle.rest_mm[0])
+                surface->rest_mm[i][k] = triangle.rest_mm[i][k] - (i > 0 ? triangle.rest_mm[0][k] : 0);
         }
     }
     const bool is_front = area_of(triangle.corners[0], triangle.corners[1], triangle.corners[2]) > 0;
@@ -485,12 +492,18 @@ struct run {
     size_t count;
 };
 
-static void find_position(const struct surface *surface, const struct seen *seen, const struct light *light,
-                          float texel[4], struct run *run)
+/* Weights of a triangle's second and third corner, on the surface. */
+static void weights_of(const struct surface *surface, const struct seen *seen, const struct light *light,
+                       float *b, float *c)
 {
     const float scale = 1 / seen->order;
-    const float b = light->is_parallel ? seen->b : seen->b * surface->order_b * scale,
-                c = light->is_parallel ? seen->c : seen->c * surface->order_c * scale;
+    *b = light->is_parallel ? seen->b : seen->b * surface->order_b * scale;
+    *c = light->is_parallel ? seen->c : seen->c * surface->order_c * scale;
+}
+
+static void find_position(const struct surface *surface, float b, float c, const struct light *light,
+                          float texel[4], struct run *run)
+{
     float length2 = 0, along = 0, way2 = 0, axis = 0;
     for (int k = 0; k < 3; k++) {
         const float normal = surface->normal[0][k] + b * surface->normal[1][k] + c * surface->normal[2][k];
@@ -536,9 +549,20 @@ static void find_shares(struct run *run)
     run->count = 0;
 }
 
-bool render_light_tiles_draw(const void *context, int x, int y, float *texels, float *objects)
+/* Small triangles show in several rows of a tile: so many are remembered. */
+enum { KNOWN_SURFACES = 64 };
+
+static void find_rest(const struct surface *surface, float b, float c, float rest_mm[4])
 {
-    const struct render_light_tiles *const tiles = context;
+    for (int k = 0; k < 3; k++)
+        rest_mm[k] = surface->rest_mm[0][k] + b * surface->rest_mm[1][k] + c * surface->rest_mm[2][k];
+    rest_mm[3] = 1;
+}
+
+/* As render_light_tiles_draw; rest_mm: as render_light_texels has it. */
+static bool draw_tile(const struct render_light_tiles *tiles, int x, int y, float *texels, float *objects,
+                      float *rest_mm)
+{
     const size_t tile = (size_t)((y + tiles->shift_px) / tiles->tile_px) * tiles->column_count +
                         (size_t)((x + tiles->shift_px) / tiles->tile_px);
     const size_t count = (size_t)tiles->tile_px * (size_t)tiles->tile_px;
@@ -551,28 +575,45 @@ bool render_light_tiles_draw(const void *context, int x, int y, float *texels, f
     for (size_t e = 0; e < entry_count; e++)
         draw_triangle(tiles, &entries[e], (uint32_t)e + 1, x, y, seen);
     const struct light light = light_of(tiles->picture.projection);
-    struct surface surface = { .object = 0 };
-    uint32_t known = 0;
+    struct surface surfaces[KNOWN_SURFACES];
+    uint32_t known[KNOWN_SURFACES] = { 0 }; /* whose they are */
     struct run run;
     run.count = 0;
     for (size_t i = 0; i < count; i++) {
         const struct seen here = seen[i];
-        if (here.entry != known && here.entry > 0) {
-            find_surface(tiles, &entries[here.entry - 1], &surface);
-            known = here.entry;
+        if (objects)
+            objects[i] = 0;
+        if (rest_mm)
+            memset(rest_mm + 4 * i, 0, 4 * sizeof *rest_mm);
+        if (here.entry == 0) /* the texel is 0 already */
+            continue;
+        const uint32_t slot = here.entry % KNOWN_SURFACES;
+        const struct surface *const surface = &surfaces[slot];
+        if (known[slot] != here.entry) {
+            find_surface(tiles, &entries[here.entry - 1], &surfaces[slot]);
+            known[slot] = here.entry;
         }
-        if (here.entry > 0) /* else the texel is 0 already */
-            find_position(&surface, &here, &light, texels + 4 * i, &run);
+        float b, c;
+        weights_of(surface, &here, &light, &b, &c);
+        find_position(surface, b, c, &light, texels + 4 * i, &run);
         if (run.count == RUN_SIZE)
             find_shares(&run);
         if (objects)
-            objects[i] = here.entry > 0 ? surface.object : 0;
+            objects[i] = surface->object;
+        if (rest_mm)
+            find_rest(surface, b, c, rest_mm + 4 * i);
     }
     find_shares(&run);
     return true;
 }
 
-/* ---- a picture ---------------------------------------------------------------------------------- */
+bool render_light_tiles_draw(const void *context, int x, int y, float *texels, float *objects)
+{
+    return draw_tile(context, x, y, texels, objects, NULL);
+}
+
+/* ---- tiles of a picture
+ * ---------------------------------------------------------------------------------- */
 
 static bool allocate(struct render_light_tiles *tiles)
 {
@@ -649,4 +690,58 @@ void render_light_tiles_destroy(struct render_light_tiles *tiles)
     free(tiles->entries);
     free(tiles->pieces);
     free(tiles);
+}
+
+/* ---- a whole picture ---------------------------------------------------------------------------- */
+
+/* Texels a side of a tile, of which one thread draws one at a time on its stack. */
+enum { WHOLE_TILE = 32, WHOLE_TILE_TEXELS = WHOLE_TILE * WHOLE_TILE };
+
+struct whole {
+    const struct render_light_tiles *tiles;
+    const struct render_light_texels *out;
+};
+
+/* What of a tile is in the picture, of so many numbers to a texel. out NULL: nothing. */
+static void copy_tile(int size_px, int x, int y, size_t components, const float *tile, float *out)
+{
+    const int width = x + WHOLE_TILE < size_px ? WHOLE_TILE : size_px - x,
+              height = y + WHOLE_TILE < size_px ? WHOLE_TILE : size_px - y;
+    for (int row = 0; out && row < height; row++)
+        memcpy(out + components * ((size_t)(y + row) * (size_t)size_px + (size_t)x),
+               tile + components * WHOLE_TILE * (size_t)row, (size_t)width * components * sizeof *out);
+}
+
+static void draw_part(void *context, int index)
+{
+    const struct whole *const whole = context;
+    const struct render_light_texels *const out = whole->out;
+    const int size_px = whole->tiles->picture.size_px, column_count = (int)whole->tiles->column_count;
+    const int x = WHOLE_TILE * (index % column_count), y = WHOLE_TILE * (index / column_count);
+    float texels[4 * WHOLE_TILE_TEXELS], objects[WHOLE_TILE_TEXELS], rest_mm[4 * WHOLE_TILE_TEXELS];
+    if (x >= size_px || y >= size_px)
+        return;
+    if (!draw_tile(whole->tiles, x, y, texels, objects, out->rest_mm ? rest_mm : NULL)) {
+        memset(objects, 0, sizeof objects);
+        memset(rest_mm, 0, sizeof rest_mm);
+    }
+    for (size_t i = 0; i < WHOLE_TILE_TEXELS; i++) {
+        if (objects[i] == 0)
+            memcpy(texels + 4 * i, out->empty, sizeof out->empty);
+    }
+    copy_tile(size_px, x, y, 4, texels, out->texels);
+    copy_tile(size_px, x, y, 1, objects, out->objects);
+    copy_tile(size_px, x, y, 4, rest_mm, out->rest_mm);
+}
+
+bool render_light_picture_draw(const struct render_light_picture *picture,
+                               const struct render_light_texels *out, dipole_status *status)
+{
+    struct render_light_tiles *tiles;
+    if (!render_light_tiles_create(picture, WHOLE_TILE, 0, &tiles, status))
+        return false;
+    struct whole whole = { .tiles = tiles, .out = out };
+    lut_parallel_for((int)tiles->tile_count, picture->thread_count, draw_part, &whole);
+    render_light_tiles_destroy(tiles);
+    return true;
 }

@@ -1,6 +1,6 @@
 /*
- * What a light sees, drawn in memory: the texels of light_samples.h as pass light_view draws them, where
- * nothing else needs a texture of them. Pure C: no OpenGL here. theory.md T13, T46.
+ * What a light sees, drawn in memory: the texels of light_samples.h as pass light_view draws them. Pure C:
+ * no OpenGL here. theory.md T13, T46.
  */
 #ifndef RENDERER_LIGHT_PICTURE_H
 #define RENDERER_LIGHT_PICTURE_H
@@ -9,6 +9,7 @@
 
 struct render_light_mesh {
     const struct io_mesh *mesh; /* positions in mm, in the world */
+    const float *rest_mm;       /* of each vertex, x y z of the object at rest; NULL: not asked for */
     double eta;                 /* index inside over outside, > 0 */
     bool has_hidden_inside;     /* no triangle is seen from behind */
 };
@@ -47,5 +48,17 @@ DIPOLE_CHECKED bool render_light_tiles_create(const struct render_light_picture 
 bool render_light_tiles_draw(const void *tiles, int x, int y, float *texels, float *objects);
 
 void render_light_tiles_destroy(struct render_light_tiles *tiles);
+
+/* A whole picture, the lowest row first; NULL: not asked for. */
+struct render_light_texels {
+    float *texels;  /* { x, y, z in mm, power share } */
+    float *objects; /* of each texel the number of its mesh, from 1; 0: none */
+    float *rest_mm; /* { x, y, z, 1 } of its surface at rest; 0: none. Every mesh has rest_mm then */
+    float empty[4]; /* texels where no surface is */
+};
+
+/* Draw all tiles of a picture. Fails with DIPOLE_OUT_OF_MEMORY. */
+DIPOLE_CHECKED bool render_light_picture_draw(const struct render_light_picture *picture,
+                                              const struct render_light_texels *out, dipole_status *status);
 
 #endif

@@ -208,7 +208,7 @@ struct render_plan_medium {
 struct render_plan {
     enum render_technique technique; /* never AUTO                                       */
     enum render_area area;
-    bool has_light_pictures; /* what lights see is drawn in memory: only their samples need it */
+    bool has_light_pictures; /* what lights see is drawn in memory */
     bool has_grid;        /* samples are the texels of a uniform grid of each light's view, in one band */
     double grid_texel_mm; /* across the view, at the widest */
     enum render_coherence coherence; /* never AUTO; NONE where no light samples move */
@@ -319,6 +319,9 @@ struct render_band_key render_plan_band_key(const struct render_plan *plan,
 
 /* Whether light samples are summed: by splats or by gathering. */
 bool render_plan_sums_samples(const struct render_plan *plan);
+
+/* Whether what lights see is drawn in memory as a whole, since more than samples is taken from it. */
+bool render_plan_keeps_pictures(const struct render_plan *plan);
 
 /* Fails unless the table is of this medium, by its hash; names the first coefficient that differs. place:
  * the table's file, or NULL. */

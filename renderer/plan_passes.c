@@ -92,7 +92,7 @@ static size_t list_passes(const struct render_plan *plan, const struct render_ef
 
 bool render_plan_wants(const struct render_plan *plan, const char *texture)
 {
-    if (strcmp(texture, "normal") == 0)
+    if (strcmp(texture, "normal") == 0 || strcmp(texture, "light_view") == 0)
         return render_plan_reads(plan, texture);
     if (strcmp(texture, "light_object") == 0)
         return plan->has_object_ids;

@@ -96,13 +96,16 @@ double render_plan_widest_spacing_mm(const struct render_plan *plan)
     return widest_mm;
 }
 
-/* What only samples are taken of needs no texture: drawing it in memory is several times faster than
- * reading one back. */
+/* Where OpenGL is software, drawing in memory is several times faster, and nothing is read back. */
 static bool can_draw_in_memory(const struct render_request *request, const struct render_plan *plan)
 {
-    return !request->has_gpu && render_plan_sums_samples(plan) && !plan->has_specular &&
-           !request->is_captured && plan->area == RENDER_AREA_FLUX &&
-           plan->coherence != RENDER_COHERENCE_SURFACE;
+    return !request->has_gpu && plan->area == RENDER_AREA_FLUX;
+}
+
+bool render_plan_keeps_pictures(const struct render_plan *plan)
+{
+    return plan->has_light_pictures && (plan->has_specular || plan->technique == RENDER_TECHNIQUE_LAMBERT ||
+                                        plan->coherence == RENDER_COHERENCE_SURFACE);
 }
 
 bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,

@@ -1,7 +1,7 @@
 #include "renderer/splat_draw.h"
 
 #include "renderer/cell_samples.h"
-#include "renderer/light_picture.h"
+#include "renderer/light_draw.h"
 #include "renderer/splats.h"
 
 #include <math.h>
@@ -115,12 +115,6 @@ static float *read_part(const struct render_frame *frame, const char *texture, G
     return texels;
 }
 
-static float *read_view(const struct render_frame *frame, const char *texture, GLenum format,
-                        size_t components)
-{
-    return read_part(frame, texture, frame->view->size_px, format, components);
-}
-
 /* The most that arrives of a channel is taken off a texel's power, and off irradiance if there is any;
  * shadows are left as parts of that. */
 static void take_shadows(float *texels, float *irradiance, float *shadows,
@@ -164,26 +158,14 @@ static bool append_drawn(const struct render_frame *frame, const struct render_l
                          const struct render_light_view *view, dipole_status *status)
 {
     const struct render_plan *const plan = frame->plan;
-    const struct io_scene *const scene = frame->request->scene;
-    struct render_light_mesh *const meshes = calloc(scene->object_count, sizeof *meshes);
-    if (!meshes)
-        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu objects",
-                           scene->object_count);
-    for (size_t i = 0; i < scene->object_count; i++)
-        meshes[i] =
-            (struct render_light_mesh){ .mesh = scene->objects[i].mesh,
-                                        .eta = plan->media->media[plan->objects[i].medium].eta,
-                                        .has_hidden_inside = render_executor_hides_inside(frame, i) };
-    const struct render_light_picture picture = { .meshes = meshes,
-                                                  .mesh_count = scene->object_count,
-                                                  .projection = &frame->view->projection,
-                                                  .size_px = view->size_px,
-                                                  .texel_area = frame->view->texel_area };
+    struct render_light_picture picture;
+    if (!render_light_picture_of(frame, &picture, status))
+        return false;
     struct render_light_view drawn = *view;
     struct render_light_tiles *tiles;
     drawn.draw_tile = render_light_tiles_draw;
     drawn.tile_px = render_light_tile_px(view->block_px);
-    drawn.tile_object_count = plan->has_object_ids ? scene->object_count : 0;
+    drawn.tile_object_count = plan->has_object_ids ? picture.mesh_count : 0;
     bool done = render_light_tiles_create(&picture, drawn.tile_px, render_light_view_shift_px(view), &tiles,
                                           status);
     if (done) {
@@ -191,15 +173,15 @@ static bool append_drawn(const struct render_frame *frame, const struct render_l
         done = render_light_samples_append(targets, &drawn, status);
         render_light_tiles_destroy(tiles);
     }
-    free(meshes);
+    render_light_picture_free(&picture);
     return done;
 }
 
 static bool append_once(const struct render_frame *frame, const struct render_light_target *targets,
                         const struct render_light_view *view, dipole_status *status)
 {
-    return frame->plan->has_light_pictures ? append_drawn(frame, targets, view, status)
-                                           : render_light_samples_append(targets, view, status);
+    return view->texels ? render_light_samples_append(targets, view, status)
+                        : append_drawn(frame, targets, view, status);
 }
 
 static bool append_view(const struct render_frame *frame, const struct render_light_target *targets,
@@ -216,65 +198,113 @@ static bool append_view(const struct render_frame *frame, const struct render_li
     return append_once(frame, targets, view, status);
 }
 
+/* What OpenGL has drawn of a view, read back; NULL: not asked for. */
+struct reading {
+    float *texels, *objects, *irradiance, *rest_mm, *shadows;
+};
+
+static void reading_end(struct reading *reading)
+{
+    free(reading->texels);
+    free(reading->objects);
+    free(reading->irradiance);
+    free(reading->rest_mm);
+    free(reading->shadows);
+}
+
+static bool read_back(const struct render_frame *frame, struct reading *reading, dipole_status *status)
+{
+    const struct render_plan *const plan = frame->plan;
+    const int block_px = render_plan_shadow_block_px(plan), size_px = frame->view->size_px;
+    const struct {
+        const char *texture;
+        bool is_wanted;
+        int side_px;
+        GLenum format;
+        size_t components;
+        float **out;
+    } parts[] = {
+        { "light_view", true, size_px, GL_RGBA, 4, &reading->texels },
+        { "light_object", render_plan_wants(plan, "light_object"), size_px, GL_RED, 1, &reading->objects },
+        { "light_irradiance", render_plan_wants(plan, "light_irradiance"), size_px, GL_RED, 1,
+          &reading->irradiance },
+        { "light_rest", render_plan_wants(plan, "light_rest"), size_px, GL_RGBA, 4, &reading->rest_mm },
+        { "light_shadow", plan->shadows.of_view != NULL, (size_px + block_px - 1) / block_px, GL_RGBA, 4,
+          &reading->shadows },
+    };
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        if (parts[i].is_wanted && !(*parts[i].out = read_part(frame, parts[i].texture, parts[i].side_px,
+                                                              parts[i].format, parts[i].components)))
+            return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL,
+                               "no memory for a light's view of %d texels a side", size_px);
+    }
+    return true;
+}
+
+/* The frame's view, of which texels are read back, kept in memory, or not known yet. */
+static struct render_light_view view_of(const struct render_frame *frame, const struct reading *reading)
+{
+    const struct render_plan *const plan = frame->plan;
+    const struct render_plan_view *const planned = frame->view;
+    const int block_px = render_plan_shadow_block_px(plan);
+    struct render_light_view view = { .texels = reading->texels,
+                                      .objects = reading->objects,
+                                      .irradiance = reading->irradiance,
+                                      .rest_mm = reading->rest_mm,
+                                      .shadows = plan->shadows.coloured_count > 0 ? reading->shadows : NULL,
+                                      .shadow_block_px = block_px,
+                                      .shadow_side_px = (planned->size_px + block_px - 1) / block_px,
+                                      .size_px = planned->size_px,
+                                      .block_px = planned->block_px };
+    if (render_plan_keeps_pictures(plan)) {
+        const struct render_light_texels *const drawn =
+            render_light_drawing_texels(render_executor_drawing(frame->executor));
+        view.texels = drawn->texels;
+        view.objects = drawn->objects;
+        view.rest_mm = drawn->rest_mm;
+    }
+    memcpy(view.forward, planned->projection.forward, sizeof view.forward);
+    view.eye_depth_mm = render_dot(planned->projection.eye_mm, planned->projection.forward);
+    view.texel = planned->projection.is_orthographic ? 0 : sqrt(planned->texel_area);
+    memcpy(view.rgb, frame->request->scene->lights[planned->light].rgb, sizeof view.rgb);
+    return view;
+}
+
+/* Where the samples of each object go. Without ids all are alike, but some may be out of sight. */
+static void find_targets(struct render_splatter *splatter, const struct render_frame *frame,
+                         struct render_light_target *targets)
+{
+    const struct render_plan *const plan = frame->plan;
+    const size_t object_count = frame->request->scene->object_count;
+    for (size_t i = 0; i < object_count; i++) {
+        const struct render_plan_object *const object = &plan->objects[i];
+        if (object->spacing_mm > 0)
+            targets[i] = target_of(frame, i, &splatter->of_medium[object->medium].bands[0]);
+    }
+    for (size_t i = 1; !plan->has_object_ids && i < object_count; i++) {
+        if (targets[i].samples && (!targets[0].samples || targets[i].spacing_mm < targets[0].spacing_mm))
+            targets[0] = targets[i];
+    }
+}
+
 bool render_splatter_sample_view(struct render_splatter *splatter, const struct render_frame *frame,
                                  dipole_status *status)
 {
-    const struct render_plan *const plan = frame->plan;
-    const struct render_plan_view *const view = frame->view;
     const size_t object_count = frame->request->scene->object_count;
     struct render_light_target *const targets = calloc(object_count, sizeof *targets);
-    const bool is_read = !plan->has_light_pictures, has_ids = plan->has_object_ids;
-    float *const texels = is_read ? read_view(frame, "light_view", GL_RGBA, 4) : NULL;
-    float *const objects = is_read && has_ids ? read_view(frame, "light_object", GL_RED, 1) : NULL;
-    const bool is_counted = plan->area == RENDER_AREA_OVERLAP;
-    float *const irradiance = is_counted ? read_view(frame, "light_irradiance", GL_RED, 1) : NULL;
-    const bool is_fixed = plan->coherence == RENDER_COHERENCE_SURFACE;
-    float *const rest_mm = is_fixed ? read_view(frame, "light_rest", GL_RGBA, 4) : NULL;
-    const bool is_shadowed = plan->shadows.of_view != NULL;
-    const int block_px = render_plan_shadow_block_px(plan),
-              side_px = (view->size_px + block_px - 1) / block_px;
-    float *const shadows = is_shadowed ? read_part(frame, "light_shadow", side_px, GL_RGBA, 4) : NULL;
-    bool done = targets && (!is_read || (texels && (objects || !has_ids))) && (irradiance || !is_counted) &&
-                (rest_mm || !is_fixed) && (shadows || !is_shadowed);
+    if (!targets)
+        return dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for %zu objects", object_count);
+    find_targets(splatter, frame, targets);
+    struct reading reading = { .texels = NULL };
+    bool done = frame->plan->has_light_pictures || read_back(frame, &reading, status);
     if (done) {
-        struct render_light_view reduced = { .texels = texels,
-                                             .objects = objects,
-                                             .irradiance = irradiance,
-                                             .rest_mm = rest_mm,
-                                             .shadow_block_px = block_px,
-                                             .shadow_side_px = side_px,
-                                             .size_px = view->size_px,
-                                             .block_px = view->block_px };
-        if (texels && shadows)
-            take_shadows(texels, irradiance, shadows, &reduced);
-        if (plan->shadows.coloured_count > 0)
-            reduced.shadows = shadows;
-        memcpy(reduced.forward, view->projection.forward, sizeof reduced.forward);
-        reduced.eye_depth_mm = render_dot(view->projection.eye_mm, view->projection.forward);
-        reduced.texel = view->projection.is_orthographic ? 0 : sqrt(view->texel_area);
-        memcpy(reduced.rgb, frame->request->scene->lights[view->light].rgb, sizeof reduced.rgb);
-        for (size_t i = 0; i < object_count; i++) {
-            const struct render_plan_object *const object = &plan->objects[i];
-            if (object->spacing_mm > 0)
-                targets[i] = target_of(frame, i, &splatter->of_medium[object->medium].bands[0]);
-        }
-        /* Without ids all are alike, but some may be out of sight. */
-        for (size_t i = 1; !has_ids && i < object_count; i++) {
-            if (targets[i].samples &&
-                (!targets[0].samples || targets[i].spacing_mm < targets[0].spacing_mm))
-                targets[0] = targets[i];
-        }
-        done = append_view(frame, targets, &reduced, status);
-    } else {
-        dipole_fail(status, DIPOLE_OUT_OF_MEMORY, NULL, "no memory for a light's view of %d texels a side",
-                    view->size_px);
+        struct render_light_view view = view_of(frame, &reading);
+        if (reading.shadows)
+            take_shadows(reading.texels, reading.irradiance, reading.shadows, &view);
+        done = append_view(frame, targets, &view, status);
     }
+    reading_end(&reading);
     free(targets);
-    free(texels);
-    free(objects);
-    free(irradiance);
-    free(rest_mm);
-    free(shadows);
     return done;
 }
 

@@ -213,7 +213,7 @@ static void plans_take_what_is_asked(void **state)
                                   "ambient_visibility",
                                   "splat",
                                   "lambert",
-                                  "light_view",
+                                  "light_picture",
                                   "light_samples" };
     enum { NAMES = 9 };
     const struct {

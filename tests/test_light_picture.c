@@ -464,6 +464,59 @@ static void hard_triangles_do_no_harm(void **state)
         assert_true(objects[i] == 0 && texels[4 * i + 3] == 0);
 }
 
+/* ---- whole pictures ----------------------------------------------------------------------------- */
+
+/* Oracle: their tiles, however wide; places at rest are where a linear map takes the surface's. */
+static void whole_pictures_are_their_tiles(void **state)
+{
+    (void)state;
+    struct rng rng = { 11 };
+    const double origin[3] = { 0, 0, 0 };
+    struct soup soups[2];
+    float rest_mm[2][9 * TRIANGLES];
+    for (int trial = 0; trial < 12; trial++) {
+        const int size_px = trial == 0 ? 1 : (int)uniform(&rng, 2, 150);
+        const size_t count = (size_t)(size_px * size_px);
+        struct render_light_mesh meshes[2];
+        for (int m = 0; m < 2; m++) {
+            fill_soup(&rng, &soups[m]);
+            for (int i = 0; i < 9 * TRIANGLES; i++)
+                rest_mm[m][i] = 2 * soups[m].positions[i] + (float)(i % 3);
+            meshes[m] =
+                (struct render_light_mesh){ .mesh = &soups[m].mesh, .rest_mm = rest_mm[m], .eta = 1.4 };
+        }
+        struct render_projection faces[RENDER_FACES];
+        double forward[3];
+        random_direction(&rng, forward);
+        views_around(origin, 0.01, 10, faces);
+        const struct render_projection view = trial % 2 == 0 ? view_along(forward) : faces[trial % 6];
+        const struct render_light_picture picture = { .meshes = meshes,
+                                                      .mesh_count = 2,
+                                                      .projection = &view,
+                                                      .size_px = size_px,
+                                                      .texel_area = texel_area_of(&view, size_px),
+                                                      .thread_count = trial % 3 };
+        float *const memory = malloc(count * 14 * sizeof *memory);
+        assert_non_null(memory);
+        float *const texels = memory, *const objects = memory + 4 * count;
+        const struct render_light_texels whole = { .texels = memory + 5 * count,
+                                                   .objects = memory + 9 * count,
+                                                   .rest_mm = memory + 10 * count,
+                                                   .empty = { 7, 8, 9, 0 } };
+        draw_picture(&picture, 23, trial, texels, objects);
+        assert_true(render_light_picture_draw(&picture, &whole, NULL));
+        for (size_t i = 0; i < count; i++) {
+            const float *const here = whole.texels + 4 * i, *const rest = whole.rest_mm + 4 * i;
+            assert_true(whole.objects[i] == objects[i]);
+            assert_memory_equal(here, objects[i] > 0 ? texels + 4 * i : whole.empty, 4 * sizeof *here);
+            for (int k = 0; k < 3; k++)
+                assert_true(fabsf(rest[k] - (objects[i] > 0 ? 2 * here[k] + (float)k : 0)) < 1e-4F);
+            assert_true(rest[3] == (objects[i] > 0 ? 1 : 0));
+        }
+        free(memory);
+    }
+}
+
 /* ---- OpenGL ------------------------------------------------------------------------------------- */
 
 /* What the last view that OpenGL drew holds, and the same drawn in memory. */
@@ -513,8 +566,8 @@ static void compare_with_opengl(const struct renderer *renderer, const struct re
     free(texels);
 }
 
-/* Oracle: pass light_view, which draws the same where surfaces are glossy. Both round corners to 1/256 of a
- * texel, so only outlines may differ, and surfaces that light grazes. */
+/* Oracle: pass light_view, which draws the same where OpenGL is not software. Both round corners to 1/256
+ * of a texel, so only outlines may differ, and surfaces that light grazes. */
 static void opengl_draws_the_same(void **state)
 {
     (void)state;
@@ -539,6 +592,7 @@ static void opengl_draws_the_same(void **state)
                                                 .media = renderer->media,
                                                 .epsilon = 0.03,
                                                 .technique = RENDER_TECHNIQUE_GATHER };
+        renderer->has_gpu = true;
         struct render_plan *plan;
         double time_ms[RENDER_EFFECT_LIMIT];
         dipole_status status;
@@ -560,6 +614,7 @@ int main(void)
         cmocka_unit_test(insides_and_threads_change_nothing),
         cmocka_unit_test(a_hollow_ball_is_seen_without_holes),
         cmocka_unit_test(hard_triangles_do_no_harm),
+        cmocka_unit_test(whole_pictures_are_their_tiles),
         cmocka_unit_test(opengl_draws_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

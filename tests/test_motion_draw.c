@@ -43,20 +43,34 @@ static struct renderer *renderer_for(const struct io_scene *scene)
     return renderer;
 }
 
-static struct render_plan *run(struct renderer *renderer, enum render_technique technique,
-                               enum render_coherence coherence)
+static struct render_plan *run_request(struct renderer *renderer, const struct render_request *request)
 {
-    const struct render_request request = { .scene = renderer->scene,
-                                            .media = renderer->media,
-                                            .technique = technique,
-                                            .coherence = coherence,
-                                            .epsilon = 0.05 };
     struct render_plan *plan;
     double time_ms[RENDER_EFFECT_LIMIT];
     dipole_status status;
-    if (!render_run(renderer, &request, &plan, time_ms, &status))
+    if (!render_run(renderer, request, &plan, time_ms, &status))
         fail_msg("%s", status.message);
     return plan;
+}
+
+static struct render_plan *run(struct renderer *renderer, enum render_technique technique,
+                               enum render_coherence coherence)
+{
+    return run_request(renderer, &(struct render_request){ .scene = renderer->scene,
+                                                           .media = renderer->media,
+                                                           .technique = technique,
+                                                           .coherence = coherence,
+                                                           .epsilon = 0.05 });
+}
+
+static const struct render_decision *decision(const struct render_plan *plan, const char *name)
+{
+    for (size_t e = 0; render_effects[e]; e++) {
+        if (strcmp(render_effects[e]->name, name) == 0)
+            return &plan->decisions[e];
+    }
+    fail_msg("no effect %s", name);
+    return NULL;
 }
 
 static float *read_texture(struct renderer *renderer, const char *name)
@@ -190,6 +204,54 @@ static void all_ways_of_sampling_keep_the_energy(void **state)
             assert_close(sums[k], sums[0], 0.01, "motion %zu, way %d", m, k);
         }
         assert_true(sums[3] == sums[2]); /* the default is the surface */
+        io_scene_destroy(scene);
+    }
+}
+
+/* Oracle: each other. What lights see is drawn in memory where OpenGL is software, and by OpenGL elsewhere:
+ * the same light enters, and gloss has the same shadows. */
+static void views_in_memory_are_those_of_opengl(void **state)
+{
+    (void)state;
+    static const enum render_coherence kinds[] = { RENDER_COHERENCE_NONE, RENDER_COHERENCE_TWO_PASS,
+                                                   RENDER_COHERENCE_SURFACE };
+    static const char *const textures[] = { "radiosity", "specular" };
+    for (size_t m = 0; m < sizeof motions / sizeof *motions; m++) {
+        struct io_scene *const scene = read_scene(motions[m], "");
+        io_scene_set_frame(scene, 4);
+        scene->objects[0].has_specular = true;
+        scene->objects[0].roughness = 0.4;
+        struct renderer *const renderer = renderer_for(scene);
+        for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+            float *pictures[2][2];
+            for (int has_gpu = 0; has_gpu < 2; has_gpu++) {
+                const struct render_request request = { .scene = scene,
+                                                        .media = renderer->media,
+                                                        .technique = RENDER_TECHNIQUE_GATHER,
+                                                        .gather = RENDER_GATHER_C,
+                                                        .coherence = kinds[k],
+                                                        .epsilon = 0.05 };
+                renderer->has_gpu = has_gpu;
+                struct render_plan *const plan = run_request(renderer, &request);
+                assert_int_equal(decision(plan, "light_view")->is_active, has_gpu);
+                assert_int_equal(decision(plan, "light_picture")->is_active, !has_gpu);
+                render_plan_destroy(plan);
+                for (int t = 0; t < 2; t++)
+                    pictures[has_gpu][t] = read_texture(renderer, textures[t]);
+            }
+            for (int t = 0; t < 2; t++) {
+                double error2 = 0, value2 = 0;
+                for (size_t i = 0; i < 4 * PIXELS; i++) {
+                    const double a = (double)pictures[0][t][i], b = (double)pictures[1][t][i];
+                    error2 += (a - b) * (a - b);
+                    value2 += b * b;
+                }
+                assert_true(value2 > 0 && error2 < 0.003 * 0.003 * value2);
+                free(pictures[0][t]);
+                free(pictures[1][t]);
+            }
+        }
+        render_destroy(renderer);
         io_scene_destroy(scene);
     }
 }
@@ -345,16 +407,6 @@ static void gathering_goes_with_the_surface(void **state)
     io_scene_destroy(scene);
 }
 
-static const struct render_decision *decision(const struct render_plan *plan, const char *name)
-{
-    for (size_t e = 0; render_effects[e]; e++) {
-        if (strcmp(render_effects[e]->name, name) == 0)
-            return &plan->decisions[e];
-    }
-    fail_msg("no effect %s", name);
-    return NULL;
-}
-
 /* Oracle: what the scene says. Only where something moves is there the one program that does it, which says
  * so. */
 static void only_what_moves_pays(void **state)
@@ -396,6 +448,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shaders_deform_as_the_library_does),
         cmocka_unit_test(all_ways_of_sampling_keep_the_energy),
+        cmocka_unit_test(views_in_memory_are_those_of_opengl),
         cmocka_unit_test(frames_do_not_depend_on_those_before),
         cmocka_unit_test(samples_stay_on_the_surface),
         cmocka_unit_test(gathering_goes_with_the_surface),

@@ -218,10 +218,10 @@ static void passes_per_view_are_repeated_together(void **state)
     test.objects[0].has_specular = true;
     const struct render_request request = request_for(&test);
     struct render_plan *const plan = plan_for(&request);
-    static const char *const names[] = { "surface_meshes",  "surface",    "position_depth",
-                                         "surface_resolve", "light_view", "light_samples",
-                                         "specular",        "light_view", "light_samples",
-                                         "specular",        "gather",     "composite" };
+    static const char *const names[] = { "surface_meshes",  "surface",       "position_depth",
+                                         "surface_resolve", "light_picture", "light_samples",
+                                         "specular",        "light_picture", "light_samples",
+                                         "specular",        "gather",        "composite" };
     assert_int_equal(plan->pass_count, sizeof names / sizeof *names);
     for (size_t i = 0; i < plan->pass_count; i++) {
         assert_string_equal(plan->passes[i].pass->name, names[i]);
@@ -403,8 +403,8 @@ static void views_for_shadows_are_as_fine_as_the_picture(void **state)
 }
 
 /* Oracle: T45. Cells no wider than 0.7 of the spacing, as many texels to each as make 768 in all or four,
- * no more; parallel light and a point light that is far away alike, drawn in memory unless a surface is
- * glossy. */
+ * no more; parallel light and a point light that is far away alike. They are drawn in memory where OpenGL
+ * is software, as a whole where shaders read them. */
 static void texels_of_views_follow_need(void **state)
 {
     (void)state;
@@ -425,11 +425,18 @@ static void texels_of_views_follow_need(void **state)
         assert_true(size_px >= 4 * cells && size_px >= 768);
         assert_true(size_px <= fmax(4 * (cells + 1), 768 + cells + 1));
         assert_true(plan->views[0].block_px <= RENDER_LIGHT_BLOCK_LIMIT);
-        assert_true(plan->has_light_pictures && !decision_of(plan, "light_view")->is_active);
+        assert_true(plan->has_light_pictures && !decision_of(plan, "light_view")->is_active &&
+                    !decision_of(plan, "light_picture")->is_active);
         render_plan_destroy(plan);
         test.objects[0].has_specular = true;
         plan = plan_for(&request);
-        assert_true(!plan->has_light_pictures && decision_of(plan, "light_view")->is_active);
+        assert_true(!decision_of(plan, "light_view")->is_active &&
+                    decision_of(plan, "light_picture")->is_active);
+        render_plan_destroy(plan);
+        request.has_gpu = true;
+        plan = plan_for(&request);
+        assert_true(decision_of(plan, "light_view")->is_active &&
+                    !decision_of(plan, "light_picture")->is_active);
         render_plan_destroy(plan);
         scene_end(&test);
     }

@@ -19,7 +19,7 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    return render_cost_ms(RENDER_COST_READ_TEXEL, render_cost_view_texels(plan));
+    return render_cost_ms(RENDER_COST_SAMPLED_TEXEL, render_cost_view_texels(plan));
 }
 
 const struct render_effect render_effect_coherence = {

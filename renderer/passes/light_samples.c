@@ -33,12 +33,14 @@ static struct render_decision decide(const struct render_request *request, const
 
 static double cost_ms(const struct render_plan *plan)
 {
-    if (plan->has_light_pictures)
+    if (plan->has_light_pictures && !render_plan_keeps_pictures(plan))
         return render_cost_ms(RENDER_COST_PICTURE_TEXEL, render_cost_view_texels(plan)) +
                (double)plan->view_count *
                    render_cost_ms(RENDER_COST_PICTURE_TRIANGLE, (double)plan->triangle_count);
-    const double ns_each = RENDER_COST_READ_TEXEL + (plan->has_object_ids ? RENDER_COST_TOLD_TEXEL : 0) +
-                           (plan->coherence == RENDER_COHERENCE_SURFACE ? RENDER_COST_CELL_TEXEL : 0);
+    const double read = plan->has_light_pictures ? 0 : RENDER_COST_READ_TEXEL;
+    const double ns_each =
+        RENDER_COST_SAMPLED_TEXEL + read + (plan->has_object_ids ? RENDER_COST_TOLD_TEXEL + read : 0) +
+        (plan->coherence == RENDER_COHERENCE_SURFACE ? RENDER_COST_CELL_TEXEL + read : 0);
     return render_cost_ms(ns_each, render_cost_view_texels(plan));
 }
 

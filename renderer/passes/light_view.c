@@ -15,9 +15,9 @@ static struct render_decision decide(const struct render_request *request, const
     if (plan->technique == RENDER_TECHNIQUE_TSM && !plan->has_specular)
         return render_not_called_for("translucent shadow maps are seen instead");
     if (plan->has_light_pictures)
-        return render_not_called_for(
-            "%zu view%s of up to %d texels a side drawn in memory, for samples alone", plan->view_count,
-            plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
+        return render_not_called_for("%zu view%s of up to %d texels a side drawn in memory",
+                                     plan->view_count, plan->view_count == 1 ? "" : "s",
+                                     plan->views[0].size_px);
     return render_called_for("%zu of %zu lights shine, seen in %zu view%s of up to %d texels a side",
                              plan->lit_count, request->scene->light_count, plan->view_count,
                              plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
