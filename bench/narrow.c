@@ -251,7 +251,7 @@ static void trial_init(const struct medium *medium, double spacing_mm, double ep
     dipole_status status = { 0 };
     *trial = (struct trial){ .medium = medium, .spacing_mm = spacing_mm, .texels = texels };
     check(render_split_init(&source, bands, 2, &trial->capped, &status), &status);
-    source.blur_mm[CHANNEL] = render_footprint_blur_mm(stack, spacing_mm, BLUR_SHARE * epsilon);
+    source.blur_mm[CHANNEL] = render_footprint_blur_mm(stack, spacing_mm, 0, BLUR_SHARE * epsilon);
     check(render_split_init(&source, bands, 2, &trial->blurred, &status), &status);
     trial->near_power = dipole_stack_within(stack, DIPOLE_FACE_LIT, cap_mm);
     for (int i = 0; i < RINGS; i++) {

@@ -27,11 +27,17 @@ struct render_footprint_kernel {
 double render_footprint_kernel_per_mm2(const struct render_footprint_kernel *kernel, double r_mm,
                                        double s_mm);
 
-/* Aliasing of samples spacing_mm apart once the profile is blurred: at most, as part of the total. */
-double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm, double blur_mm);
+/* Aliasing of samples up to spacing_mm apart, at most, as part of the total. With a spread, samples have
+ * second moments, of patches as wide as they are apart. T11, T82 */
+double render_footprint_aliasing(const dipole_stack *stack, double spacing_mm,
+                                 const struct render_footprint_kernel *kernel);
 
 /* The blur that keeps aliasing at epsilon; 0 where it is less without. */
-double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double epsilon);
+double render_footprint_blur_mm(const dipole_stack *stack, double spacing_mm, double spread_mm,
+                                double epsilon);
+
+/* The spacing at which aliasing is epsilon without a blur, of a spread that is such a part of it, or 0. */
+double render_footprint_sharp_spacing_mm(const dipole_stack *stack, double epsilon, double spread);
 
 /* What the blur changes at the edge of a shadow on a flat surface, at most, as part of the lit radiosity:
  * of means over pixel_mm, or with 0 at any point. */
@@ -41,8 +47,8 @@ double render_footprint_error(const dipole_stack *stack, double blur_mm, double 
 #define RENDER_FOOTPRINT_REACH 9
 
 /* The spacing at which aliasing and error of the blur are epsilon each; not less than least_mm. */
-double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double least_mm,
-                                   double pixel_mm);
+double render_footprint_spacing_mm(const dipole_stack *stack, double epsilon, double spread,
+                                   double least_mm, double pixel_mm);
 
 /* Averaged profile of the lit face, tabulated out to reach_mm. One allocation; end it with free. */
 struct render_footprint {

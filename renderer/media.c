@@ -1,6 +1,7 @@
 #include "renderer/media.h"
 
 #include "renderer/area_light.h"
+#include "renderer/footprint.h"
 #include "renderer/passage.h"
 #include "renderer/solid.h"
 
@@ -194,13 +195,13 @@ double render_medium_r_max_mm(const struct render_medium *medium, double epsilon
     return farthest_mm;
 }
 
-double render_medium_spacing_mm(const struct render_medium *medium, double epsilon)
+double render_medium_spacing_mm(const struct render_medium *medium, double epsilon, double spread)
 {
     double narrowest_mm = INFINITY;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (medium->diffuse_reflectance[c] > 0)
-            narrowest_mm = fmin(narrowest_mm,
-                                dipole_stack_splat_spacing_mm(medium->stacks[c], DIPOLE_FACE_LIT, epsilon));
+            narrowest_mm =
+                fmin(narrowest_mm, render_footprint_sharp_spacing_mm(medium->stacks[c], epsilon, spread));
     }
     return narrowest_mm;
 }

@@ -55,10 +55,10 @@ void render_media_destroy(struct render_media *media);
 void render_media_measure(const struct io_scene *scene, struct render_media *media);
 
 /* How far all but epsilon of what leaves a medium travels, the farthest channel; and how far apart light
- * samples alias by at most epsilon, the narrowest. 0 and INFINITY where nothing scatters. theory.md T9,
- * T11. */
+ * samples alias by at most epsilon, the narrowest; spread: render_footprint_sharp_spacing_mm's. 0 and
+ * INFINITY where nothing scatters. theory.md T9, T11, T82. */
 double render_medium_r_max_mm(const struct render_medium *medium, double epsilon);
-double render_medium_spacing_mm(const struct render_medium *medium, double epsilon);
+double render_medium_spacing_mm(const struct render_medium *medium, double epsilon, double spread);
 
 /* The shortest mean free path of any layer of a channel that scatters; INFINITY where none does. */
 double render_medium_shortest_path_mm(const struct render_medium *medium);

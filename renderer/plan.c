@@ -394,6 +394,7 @@ bool render_plan_create(const struct render_request *request, struct render_plan
         render_plan_spend_epsilon(request, plan);
         tell_objects_apart(request, plan);
         choose_technique(request, plan);
+        render_plan_space_samples(request, plan);
         render_plan_spend_on_gathering(request, plan);
         render_plan_choose_cells(request, plan);
         done = render_plan_light_from_around(request, plan, status) &&

@@ -250,6 +250,7 @@ struct render_plan {
     double interpolation_epsilon, own_epsilon, finest_spacings;
     double truncation_error, aliasing_error, blur_error, banding_error, table_error, environment_error,
         gloss_error, error_predicted; /* gloss: 0 where it is drawn */
+    double spread;                    /* of a sample's light, as part of their spacing; 0 unless gathered */
     double flat_mm;    /* light may be looked for so far from surfaces; INFINITY: of a capture */
     double r_max_mm;   /* the farthest medium's                            */
     double r_max_px;   /* on the picture, at the nearest                   */

@@ -49,22 +49,20 @@
 /* A sampled shape is followed by at least so many samples, however far the light scatters. */
 #define SAMPLES_ACROSS 32
 
-/* Largest over the channels that scatter. */
-static double worst(const struct render_medium *medium,
-                    double (*quantity)(const dipole_stack *stack, double a, double b), double a, double b)
+static double tail(const dipole_stack *stack, double r_mm)
 {
-    double largest = 0;
-    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
-        if (medium->diffuse_reflectance[c] > 0)
-            largest = fmax(largest, quantity(medium->stacks[c], a, b));
-    }
-    return largest;
+    return dipole_stack_beyond(stack, DIPOLE_FACE_LIT, r_mm) / dipole_stack_total(stack, DIPOLE_FACE_LIT);
 }
 
-static double tail(const dipole_stack *stack, double r_mm, double unused)
+/* Of the channel that reaches farthest. */
+static double longest_tail(const struct render_medium *medium, double r_mm)
 {
-    (void)unused;
-    return dipole_stack_beyond(stack, DIPOLE_FACE_LIT, r_mm) / dipole_stack_total(stack, DIPOLE_FACE_LIT);
+    double longest = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        if (medium->diffuse_reflectance[c] > 0)
+            longest = fmax(longest, tail(medium->stacks[c], r_mm));
+    }
+    return longest;
 }
 
 /* Within which no more than that part of the light leaves, of the narrowest channel. */
@@ -86,8 +84,9 @@ static double blurred_spacing_mm(const struct render_plan *plan, const struct re
     double narrowest_mm = INFINITY;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (medium->diffuse_reflectance[c] > 0)
-            narrowest_mm = fmin(narrowest_mm, render_footprint_spacing_mm(medium->stacks[c], epsilon,
-                                                                          least_mm, plan->least_pixel_mm));
+            narrowest_mm =
+                fmin(narrowest_mm, render_footprint_spacing_mm(medium->stacks[c], epsilon, plan->spread,
+                                                               least_mm, plan->least_pixel_mm));
     }
     return narrowest_mm;
 }
@@ -96,7 +95,7 @@ static double blurred_spacing_mm(const struct render_plan *plan, const struct re
 static double sampled_spacing_mm(const struct render_plan *plan, const struct render_medium *medium,
                                  double widest_mm)
 {
-    const double sharp_mm = render_medium_spacing_mm(medium, plan->aliasing_epsilon);
+    const double sharp_mm = render_medium_spacing_mm(medium, plan->aliasing_epsilon, plan->spread);
     if (sharp_mm >= widest_mm)
         return widest_mm;
     const double blurred_mm = blurred_spacing_mm(plan, medium, 0.5 * plan->aliasing_epsilon, sharp_mm);
@@ -123,12 +122,20 @@ static void spend_on_medium(const struct render_request *request, struct render_
         planned->r_max_mm =
             planned->diameter_mm; /* every pair of points is near enough: nothing is cut off */
     else
-        planned->truncation_error = worst(medium, tail, planned->r_max_mm, 0);
-    const double widest_mm = planned->diameter_mm / SAMPLES_ACROSS;
-    planned->wanted_mm =
-        request->spacing_mm > 0 ? request->spacing_mm : sampled_spacing_mm(plan, medium, widest_mm);
-    planned->spacing_mm = planned->wanted_mm;
+        planned->truncation_error = longest_tail(medium, planned->r_max_mm);
     plan->r_max_mm = fmax(plan->r_max_mm, planned->r_max_mm);
+}
+
+static void space_medium(const struct render_request *request, struct render_plan *plan, size_t index)
+{
+    struct render_plan_medium *const planned = &plan->of_medium[index];
+    if (!(planned->r_max_mm > 0))
+        return;
+    planned->wanted_mm =
+        request->spacing_mm > 0
+            ? request->spacing_mm
+            : sampled_spacing_mm(plan, &plan->media->media[index], planned->diameter_mm / SAMPLES_ACROSS);
+    planned->spacing_mm = planned->wanted_mm;
     plan->spacing_mm = fmin(plan->spacing_mm, planned->spacing_mm);
 }
 
@@ -263,15 +270,24 @@ void render_plan_spend_epsilon(const struct render_request *request, struct rend
     plan->aliasing_epsilon = limit_or(limits->aliasing, ALIASING_SHARE * plan->epsilon);
     plan->banding_epsilon = BANDING_SHARE * plan->epsilon;
     plan->table_epsilon = fmax(limit_or(limits->table, TABLE_SHARE * plan->epsilon), LUT_EPSILON_MIN);
-    plan->spacing_mm = plan->flat_mm = INFINITY;
+    plan->flat_mm = INFINITY;
     for (size_t m = 0; m < plan->media->count; m++)
         spend_on_medium(request, plan, m);
+    plan->r_max_px = plan->r_max_mm / plan->least_pixel_mm;
+}
+
+void render_plan_space_samples(const struct render_request *request, struct render_plan *plan)
+{
+    /* samples that are gathered know how far they were spread */
+    plan->spread = plan->technique == RENDER_TECHNIQUE_GATHER ? RENDER_FOOTPRINT_SPREAD : 0;
+    plan->spacing_mm = INFINITY;
+    for (size_t m = 0; m < plan->media->count; m++)
+        space_medium(request, plan, m);
     space_objects(request, plan);
     limit_samples(request, plan);
     if (isinf(plan->spacing_mm)) /* nothing scatters */
         plan->spacing_mm =
             request->spacing_mm > 0 ? request->spacing_mm : 2 * plan->ball.radius_mm / SAMPLES_ACROSS;
-    plan->r_max_px = plan->r_max_mm / plan->least_pixel_mm;
 }
 
 void render_plan_spend_on_gathering(const struct render_request *request, struct render_plan *plan)
@@ -286,18 +302,41 @@ void render_plan_spend_on_gathering(const struct render_request *request, struct
     plan->finest_spacings = render_gather_finest_spacings(plan->banding_epsilon);
 }
 
-/* Of each channel that would alias by more than its share. */
+/* Of the channels that scatter. */
+static double worst_aliasing(const struct render_medium *medium, double spacing_mm, double spread_mm,
+                             const double blur_mm[IO_CHANNEL_COUNT])
+{
+    double worst = 0;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
+        const struct render_footprint_kernel kernel = { blur_mm[c], spread_mm };
+        if (medium->diffuse_reflectance[c] > 0)
+            worst = fmax(worst, render_footprint_aliasing(medium->stacks[c], spacing_mm, &kernel));
+    }
+    return worst;
+}
+
+/* Whether a channel aliases by more than its share. */
+static bool needs_blur(const struct render_plan *plan, const struct render_medium *medium,
+                       double spacing_mm, double spread_mm)
+{
+    const double epsilon = plan->aliasing_epsilon * (1 + 1e-6);
+    bool is_needed = false;
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        is_needed |= medium->diffuse_reflectance[c] > 0 &&
+                     render_footprint_blur_mm(medium->stacks[c], spacing_mm, spread_mm, epsilon) > 0;
+    return is_needed;
+}
+
+/* Half of the share each is for aliasing and blur then. */
 static void blur_channels(const struct render_plan *plan, const struct render_medium *medium,
                           double spacing_mm, struct render_plan_medium *planned)
 {
-    planned->aliasing_error = 0;
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         const dipole_stack *const stack = medium->stacks[c];
         if (!(medium->diffuse_reflectance[c] > 0))
             continue;
-        planned->blur_mm[c] = render_footprint_blur_mm(stack, spacing_mm, 0.5 * plan->aliasing_epsilon);
-        planned->aliasing_error = fmax(planned->aliasing_error,
-                                       render_footprint_aliasing(stack, spacing_mm, planned->blur_mm[c]));
+        planned->blur_mm[c] =
+            render_footprint_blur_mm(stack, spacing_mm, planned->spread_mm, 0.5 * plan->aliasing_epsilon);
         if (planned->blur_mm[c] > 0)
             planned->blur_error =
                 fmax(planned->blur_error,
@@ -332,8 +371,8 @@ static double change_mm(const struct render_medium *medium, double cap_mm)
     for (int c = 0; c < IO_CHANNEL_COUNT; c++) {
         if (!(medium->diffuse_reflectance[c] > 0))
             continue;
-        const double beyond = tail(medium->stacks[c], cap_mm, 0),
-                     farther = tail(medium->stacks[c], 2 * cap_mm, 0);
+        const double beyond = tail(medium->stacks[c], cap_mm),
+                     farther = tail(medium->stacks[c], 2 * cap_mm);
         if (beyond > VISIBLE_SHARE && farther > 0)
             fastest_per_mm = fmax(fastest_per_mm, log(beyond / farther) / cap_mm);
     }
@@ -359,13 +398,13 @@ static void settle_medium(const struct render_request *request, struct render_pl
     const double finest_mm = (is_gathered ? plan->finest_spacings : 1) * planned->spacing_mm;
     const double spacing_mm = fmax(planned->spacing_mm, texel_mm);
     const double on_slopes_mm = spacing_mm * fmin(fmax(spacing_mm / wanted_mm, 1), SLOPE_LIMIT);
-    planned->spread_mm = !is_gathered || request->is_captured
-                             ? 0
-                             : RENDER_FOOTPRINT_SPREAD * closest_spacing_mm(plan, index, texel_mm);
-    planned->aliasing_error =
-        request->is_captured ? 0 : worst(medium, render_footprint_aliasing, on_slopes_mm, 0);
-    if (planned->aliasing_error > plan->aliasing_epsilon * (1 + 1e-6))
-        blur_channels(plan, medium, on_slopes_mm, planned);
+    planned->spread_mm = plan->spread * closest_spacing_mm(plan, index, texel_mm);
+    if (!request->is_captured) {
+        if (needs_blur(plan, medium, on_slopes_mm, planned->spread_mm))
+            blur_channels(plan, medium, on_slopes_mm, planned);
+        planned->aliasing_error =
+            worst_aliasing(medium, on_slopes_mm, planned->spread_mm, planned->blur_mm);
+    }
     const double widest_blur_mm = fmax(fmax(planned->blur_mm[0], planned->blur_mm[1]), planned->blur_mm[2]);
     /* Footprints may be wider than the profile. */
     const double blurred_mm = fmin(RENDER_FOOTPRINT_REACH * widest_blur_mm, planned->diameter_mm);

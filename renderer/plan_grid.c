@@ -81,7 +81,7 @@ static double texel_for_slopes_mm(const struct render_medium *medium, double eps
  * across a shape as ever. */
 static double facing_mm(const struct render_plan *plan, size_t medium)
 {
-    return fmin(render_medium_spacing_mm(&plan->media->media[medium], plan->aliasing_epsilon),
+    return fmin(render_medium_spacing_mm(&plan->media->media[medium], plan->aliasing_epsilon, 0),
                 plan->of_medium[medium].wanted_mm);
 }
 

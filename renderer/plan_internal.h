@@ -28,6 +28,7 @@ void render_plan_forget_environment(struct render_plan *plan);
 void render_plan_look_at_gloss(const struct render_request *request, struct render_plan *plan);
 
 void render_plan_spend_epsilon(const struct render_request *request, struct render_plan *plan);
+void render_plan_space_samples(const struct render_request *request, struct render_plan *plan);
 void render_plan_spend_on_gathering(const struct render_request *request, struct render_plan *plan);
 void render_plan_settle_spacing(const struct render_request *request, struct render_plan *plan);
 void render_plan_predict_error(const struct render_request *request, struct render_plan *plan);

@@ -29,7 +29,7 @@ static inline void profile_init_of(struct test_profile *profile, const struct io
                                                       .epsilon = 0.02 * epsilon },
                                &profile->table, NULL));
     profile->source = (struct render_band_source){ .table = profile->table, .medium = &profile->medium };
-    profile->spacing_mm = render_medium_spacing_mm(&profile->medium, 0.58 * epsilon);
+    profile->spacing_mm = render_medium_spacing_mm(&profile->medium, 0.58 * epsilon, 0);
     profile->r_max_mm = render_medium_r_max_mm(&profile->medium, 0.02 * epsilon);
 }
 

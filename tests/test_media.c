@@ -241,12 +241,12 @@ static void objects_are_told_apart_where_it_matters(void **state)
         assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 20, -50, &medium));
         assert_true(
             scene_add(&test, IO_PRIMITIVE_SPHERE, 16, 20, i == 1 ? -8 : 50, i == 2 ? &other : &medium));
-        test.objects[0].has_specular = true; /* so that OpenGL draws what the light sees */
         scene_add_directional(&test, 0, 0, -1, 3);
         struct render_plan *plan;
         assert_true(render_plan_create(&(struct render_request){ .scene = &test.scene,
                                                                  .epsilon = 0.05,
-                                                                 .technique = RENDER_TECHNIQUE_SPLAT },
+                                                                 .technique = RENDER_TECHNIQUE_SPLAT,
+                                                                 .has_gpu = true },
                                        &plan, NULL));
         assert_int_equal(plan->has_object_ids, i > 0);
         assert_int_equal(render_plan_writes(plan, "light_object"), i > 0);
