@@ -718,13 +718,11 @@ static void draw_part(void *context, int index)
     const struct render_light_texels *const out = whole->out;
     const int size_px = whole->tiles->picture.size_px, column_count = (int)whole->tiles->column_count;
     const int x = WHOLE_TILE * (index % column_count), y = WHOLE_TILE * (index / column_count);
-    float texels[4 * WHOLE_TILE_TEXELS], objects[WHOLE_TILE_TEXELS], rest_mm[4 * WHOLE_TILE_TEXELS];
+    float texels[4 * WHOLE_TILE_TEXELS], objects[WHOLE_TILE_TEXELS] = { 0 }, rest_mm[4 * WHOLE_TILE_TEXELS];
     if (x >= size_px || y >= size_px)
         return;
-    if (!draw_tile(whole->tiles, x, y, texels, objects, out->rest_mm ? rest_mm : NULL)) {
-        memset(objects, 0, sizeof objects);
+    if (!draw_tile(whole->tiles, x, y, texels, objects, out->rest_mm ? rest_mm : NULL))
         memset(rest_mm, 0, sizeof rest_mm);
-    }
     for (size_t i = 0; i < WHOLE_TILE_TEXELS; i++) {
         if (objects[i] == 0)
             memcpy(texels + 4 * i, out->empty, sizeof out->empty);

@@ -476,7 +476,7 @@ static void whole_pictures_are_their_tiles(void **state)
     float rest_mm[2][9 * TRIANGLES];
     for (int trial = 0; trial < 12; trial++) {
         const int size_px = trial == 0 ? 1 : (int)uniform(&rng, 2, 150);
-        const size_t count = (size_t)(size_px * size_px);
+        const size_t count = (size_t)size_px * (size_t)size_px;
         struct render_light_mesh meshes[2];
         for (int m = 0; m < 2; m++) {
             fill_soup(&rng, &soups[m]);
