@@ -344,7 +344,7 @@ static bool add_all(struct plot_text *page, const struct accuracy_sweep *sweep, 
     plot_text_print(
         page,
         "<p class=\"small\">%d \u00d7 %d pixels; %s, %d cores; %s. Times: medians of %d pictures each, "
-        "of two where one takes over 3 s, drawn in turns after one that does not count. Errors: of "
+        "of two where one takes over 3 s, drawn in turns of two after one that does not count. Errors: of "
         "radiance against the converged surface "
         "integral, whose own is estimated at %s %%, over pixels whose rays and neighbours\u2019 all "
         "meet one piece of surface: edges are a matter of points to a pixel, of which the renderer has "

@@ -18,6 +18,10 @@
 /* For each channel of a material, of the physics ladder. */
 enum { LADDER_PHOTONS = 1000000 };
 
+/* Points take turns, so that what disturbs one disturbs all. In its turn a point's picture is drawn so many
+ * times after one that does not count: tables of the point before made room for its own. */
+enum { TURN_PICTURES = 2 };
+
 /* Pictures that take so long are hardly disturbed, and are drawn fewer times. */
 #define SLOW_MS 3000.0
 enum { SLOW_REPEATS = 2 };
@@ -155,15 +159,12 @@ static bool measure_error(struct accuracy_sweep *sweep, struct accuracy_point *p
     return true;
 }
 
-static bool measure_time(struct accuracy_sweep *sweep, struct accuracy_point *point, dipole_status *status)
+static bool measure_time(struct accuracy_sweep *sweep, struct accuracy_point *point, double *time_ms,
+                         dipole_status *status)
 {
     struct io_image *image;
-    double time_ms;
-    const bool done = draw(sweep, point, &time_ms, &image, status);
+    const bool done = draw(sweep, point, time_ms, &image, status);
     io_image_destroy(image);
-    if (done)
-        point->times_ms[point->time_count++] = time_ms;
-    summarize(point);
     return done;
 }
 
@@ -199,10 +200,36 @@ static bool draw_reference(struct accuracy_sweep *sweep, const char *path,
     return io_exr_write(path, sweep->reference, false, status);
 }
 
-static bool is_timed(const struct accuracy_sweep *sweep, const struct accuracy_point *point)
+static bool is_slow(const struct accuracy_point *point)
 {
-    const bool is_slow = point->time_count >= SLOW_REPEATS && point->time_ms.median > SLOW_MS;
-    return is_slow || point->time_count >= (size_t)sweep->repeat_count;
+    return point->time_count > 0 && point->time_ms.median > SLOW_MS;
+}
+
+/* Whether its picture was drawn so many times, or as often as it will be. */
+static bool is_timed(const struct accuracy_sweep *sweep, const struct accuracy_point *point, int count)
+{
+    const int most =
+        is_slow(point) && sweep->repeat_count > SLOW_REPEATS ? SLOW_REPEATS : sweep->repeat_count;
+    return point->time_count >= (size_t)(count < most ? count : most);
+}
+
+/* Until its picture was drawn so many times, or *stop. */
+static bool take_turn(struct accuracy_sweep *sweep, struct accuracy_point *point, int count,
+                      const volatile sig_atomic_t *stop, dipole_status *status)
+{
+    double time_ms = 0;
+    bool done = true;
+    if (!point->picture)
+        done = measure_error(sweep, point, status);
+    else if (!is_slow(point))
+        done = measure_time(sweep, point, &time_ms, status);
+    while (done && point->is_drawn && !*stop && !is_timed(sweep, point, count)) {
+        done = measure_time(sweep, point, &time_ms, status);
+        if (done)
+            point->times_ms[point->time_count++] = time_ms;
+        summarize(point);
+    }
+    return done;
 }
 
 bool accuracy_sweep_is_complete(const struct accuracy_sweep *sweep)
@@ -210,7 +237,7 @@ bool accuracy_sweep_is_complete(const struct accuracy_sweep *sweep)
     for (size_t i = 0; i < sweep->point_count; i++) {
         if (sweep->points[i].refusal[0])
             continue;
-        if (!sweep->points[i].is_drawn || !is_timed(sweep, &sweep->points[i]))
+        if (!sweep->points[i].is_drawn || !is_timed(sweep, &sweep->points[i], sweep->repeat_count))
             return false;
     }
     return true;
@@ -223,25 +250,25 @@ bool accuracy_sweep_run(struct accuracy_sweep *sweep, const char *folder, const 
     snprintf(path, sizeof path, "%s/accuracy.json", folder);
     snprintf(reference_path, sizeof reference_path, "%s/reference.exr", folder);
 
-    const size_t step_count = sweep->point_count * (size_t)(sweep->repeat_count + 1);
+    const int turn_count = (sweep->repeat_count + TURN_PICTURES - 1) / TURN_PICTURES;
+    const size_t step_count = sweep->point_count * (size_t)turn_count;
     size_t step = 0;
     if (!accuracy_results_resume(sweep, path, status) ||
         !draw_reference(sweep, reference_path, progress, status))
         return false;
     for (size_t i = 0; i < sweep->point_count; i++)
         summarize(&sweep->points[i]);
-    for (int round = 0; round <= sweep->repeat_count; round++) {
+    for (int turn = 0; turn < turn_count; turn++) {
         for (size_t i = 0; i < sweep->point_count; i++, step++) {
             struct accuracy_point *const point = &sweep->points[i];
-            const bool is_done = round == 0 ? point->picture != NULL
-                                            : point->time_count >= (size_t)round || is_timed(sweep, point);
+            const int count = (turn + 1) * TURN_PICTURES;
             if (*stop)
                 return true;
             if (progress->show)
                 progress->show(progress->context, point->knob->name, (double)step / (double)step_count);
-            if (is_done || point->refusal[0])
+            if (point->refusal[0] || (point->picture && is_timed(sweep, point, count)))
                 continue;
-            if (!(round == 0 ? measure_error(sweep, point, status) : measure_time(sweep, point, status)) ||
+            if (!take_turn(sweep, point, count, stop, status) ||
                 !accuracy_results_write(sweep, path, status))
                 return false;
         }
