@@ -19,7 +19,7 @@
 enum { LADDER_PHOTONS = 1000000 };
 
 /* Points take turns, so that what disturbs one disturbs all. In its turn a point's picture is drawn so many
- * times after one that does not count: tables of the point before made room for its own. */
+ * times after one that does not count, which makes the tables that the point before has replaced. */
 enum { TURN_PICTURES = 2 };
 
 /* Pictures that take so long are hardly disturbed, and are drawn fewer times. */

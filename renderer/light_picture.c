@@ -612,8 +612,7 @@ bool render_light_tiles_draw(const void *context, int x, int y, float *texels, f
     return draw_tile(context, x, y, texels, objects, NULL);
 }
 
-/* ---- tiles of a picture
- * ---------------------------------------------------------------------------------- */
+/* ---- tiles of a picture -------------------------------------------------------------------------- */
 
 static bool allocate(struct render_light_tiles *tiles)
 {

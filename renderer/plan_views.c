@@ -104,8 +104,9 @@ static bool can_draw_in_memory(const struct render_request *request, const struc
 
 bool render_plan_keeps_pictures(const struct render_plan *plan)
 {
-    return plan->has_light_pictures && (plan->has_specular || plan->technique == RENDER_TECHNIQUE_LAMBERT ||
-                                        plan->coherence == RENDER_COHERENCE_SURFACE);
+    const bool is_read =
+        plan->technique == RENDER_TECHNIQUE_LAMBERT || plan->coherence == RENDER_COHERENCE_SURFACE;
+    return plan->has_light_pictures && (plan->has_specular || (plan->has_scattering && is_read));
 }
 
 bool render_plan_make_views(const struct render_request *request, struct render_plan *plan,

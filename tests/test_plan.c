@@ -463,6 +463,31 @@ static void texels_of_views_follow_need(void **state)
     }
 }
 
+/* Oracle: the list of what reads it. Nothing scatters: what lights see is drawn for gloss alone. */
+static void nothing_is_drawn_for_a_black_medium(void **state)
+{
+    (void)state;
+    struct io_material black = skin1();
+    for (int c = 0; c < IO_CHANNEL_COUNT; c++)
+        black.layers[c][0].medium.sigma_s_prime_per_mm = 0;
+    for (int technique = 0; technique < 2; technique++) {
+        struct test_scene test;
+        scene_init(&test, 400);
+        assert_true(scene_add(&test, IO_PRIMITIVE_SPHERE, 32, 80, 0, &black));
+        scene_add_directional(&test, -1, -1, -1, 3);
+        struct render_request request = request_for(&test);
+        request.technique = technique == 0 ? RENDER_TECHNIQUE_LAMBERT : RENDER_TECHNIQUE_GATHER;
+        for (int is_glossy = 0; is_glossy < 2; is_glossy++) {
+            test.objects[0].has_specular = is_glossy;
+            struct render_plan *const plan = plan_for(&request);
+            assert_int_equal(decision_of(plan, "light_picture")->is_active, is_glossy);
+            assert_false(decision_of(plan, "light_view")->is_active);
+            render_plan_destroy(plan);
+        }
+        scene_end(&test);
+    }
+}
+
 /* Oracle: 4096 texels over 2000 mm are too coarse for marble: the plan says so, blurs and predicts more. */
 static void a_light_view_that_is_too_coarse_is_told(void **state)
 {
@@ -729,6 +754,7 @@ int main(void)
         cmocka_unit_test(auto_takes_lambert_when_scattering_is_under_a_pixel),
         cmocka_unit_test(views_for_shadows_are_as_fine_as_the_picture),
         cmocka_unit_test(texels_of_views_follow_need),
+        cmocka_unit_test(nothing_is_drawn_for_a_black_medium),
         cmocka_unit_test(a_light_view_that_is_too_coarse_is_told),
         cmocka_unit_test(the_callers_table_counts),
         cmocka_unit_test(every_vertex_is_in_a_lights_view),

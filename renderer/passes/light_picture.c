@@ -12,9 +12,7 @@ static struct render_decision decide(const struct render_request *request, const
     if (!plan->has_light_pictures)
         return render_not_called_for("lights' views are drawn by OpenGL, or not at all");
     if (!render_plan_keeps_pictures(plan))
-        return render_not_called_for("%zu view%s of up to %d texels a side, for samples alone",
-                                     plan->view_count, plan->view_count == 1 ? "" : "s",
-                                     plan->views[0].size_px);
+        return render_not_called_for("no more than samples is taken from what lights see");
     return render_called_for("%zu view%s of up to %d texels a side: OpenGL is software", plan->view_count,
                              plan->view_count == 1 ? "" : "s", plan->views[0].size_px);
 }
