@@ -11,9 +11,6 @@
 
 enum { REPEATS = 3, PICTURE_LIMIT = 64, EFFECT_SLOTS = RENDER_EFFECT_LIMIT + 1 };
 
-/* What is too short for its time to tell of more than the clock. */
-#define TOLD_MS 0.05
-
 /* ---- what is drawn ------------------------------------------------------------------------------ */
 
 static const struct {
@@ -156,7 +153,7 @@ enum { NO_SCENE = -1 };
 
 static bool is_told(const struct picture *picture, size_t e)
 {
-    return picture->predicted_ms[e] > 0 && picture->measured_ms[e] > TOLD_MS;
+    return picture->predicted_ms[e] > 0 && picture->measured_ms[e] > ACCURACY_TOLD_MS;
 }
 
 /* Of all scenes but one, if others have it. */

@@ -4,6 +4,9 @@
 
 #include "renderer/calibration.h"
 
+/* What is too short for its time to tell of more than the clock. */
+#define ACCURACY_TOLD_MS 0.05
+
 /* One effect, over all pictures that ran it. */
 struct accuracy_effect_times {
     char name[32];

@@ -1,5 +1,6 @@
 #include "accuracy/page_internal.h"
 
+#include "accuracy/calibrate.h"
 #include "accuracy/statistics.h"
 #include "renderer/plan.h"
 
@@ -113,7 +114,8 @@ static bool add_times(struct plot_text *page, const struct accuracy_sweep *sweep
         size_t times = 0;
         for (size_t i = 0; i < sweep->point_count; i++) {
             const struct accuracy_effect_time *const effect = &sweep->points[i].effects[e];
-            if (effect->is_active && effect->measured_ms > 0)
+            if (effect->is_active && effect->measured_ms > 0 &&
+                fmax(effect->predicted_ms, effect->measured_ms) > ACCURACY_TOLD_MS)
                 errors[times++] = fabs(effect->predicted_ms / effect->measured_ms - 1);
         }
         if (times > 0)
